@@ -292,11 +292,10 @@ impl ElasticField {
         if c.densification == Some(true) {
             let law = c.foam().law(body.stiffness_pa_per_m);
             let m_per_pa = 1.0 / c.stiffness_pa_per_m + body_m_per_pa;
-            let mean = |p: f64, share: f64| share * law.pressure_pa(p / share * m_per_pa);
             let mut shares = self.shares.iter().peekable();
             for (cell, p) in self.patch_pa.iter_mut().enumerate() {
                 let share = shares.next_if(|(at, _)| *at == cell).map_or(1.0, |(_, share)| *share);
-                *p = mean(*p, share);
+                *p = share * law.pressure_pa(*p / share * m_per_pa);
             }
         }
         Some(self.patch_pa.iter().sum::<f64>() * self.envelope.cell_m() * self.envelope.cell_m())

@@ -54,16 +54,6 @@ impl ElasticKernel {
         (1.0 - poisson * poisson) / modulus_pa
     }
 
-    /// K under uniform pressure, Pa/m: 0 for the half-space.
-    pub(crate) fn uniform_stiffness_pa_per_m(&self) -> f64 {
-        match *self {
-            Self::HalfSpace { .. } => 0.0,
-            Self::Layer { modulus_pa, poisson, thickness_m } => {
-                confined_stiffness_pa_per_m(modulus_pa, poisson, thickness_m)
-            }
-        }
-    }
-
     /// C(k), m/Pa, at the wave number `wave_per_m` (k > 0; for the layer also 0).
     ///
     /// Half-space: 2/(E* k). Layer: C = (2/(E* k)) · [(3−4ν) sinh 2x − 2x] / [(3−4ν) cosh 2x + 2x² + 5 − 12ν + 8ν²]

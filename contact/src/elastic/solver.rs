@@ -168,23 +168,20 @@ impl Level {
         }
     }
 
-    /// Compliance that single cells of a patch have besides, for the share of them that is under the body.
+    /// Gives the cells of a patch the share of them that is under the body, those that are not whole.
     ///
-    /// On a share c of a cell of side a the pressure p stands for p/c on a square of side √c a, whose own compliance is
-    /// C(√c a) with C(s) = 1/(1/(α s) + K): α s at the middle of a square on a half-space, α = 4 ln(1 + √2)/(π E*)
-    /// (K. L. Johnson, *Contact Mechanics* (1985), §3.3), and 1/K on a wide one on a layer.
-    pub(crate) fn set_shares(&mut self, kernel: &ElasticKernel, cells: usize, shares: &[(usize, f64)]) {
+    /// On a share c the mean pressure p stands for p/c. As if under that pressure on all of it, the cell sinks by p/c
+    /// times its own coefficient: it is softer by (1/c − 1) of that. So the cells that an edge cuts carry what is theirs
+    /// of the pressure along the edge, and force and centre hardly feel where the edge is within a cell.
+    pub(crate) fn set_shares(&mut self, cells: usize, shares: &[(usize, f64)]) {
         self.own_m_per_pa.clear();
         if shares.is_empty() {
             return;
         }
         self.own_m_per_pa.resize(cells, 0.0);
-        let per_m = 4.0 * (1.0 + std::f64::consts::SQRT_2).ln() / std::f64::consts::PI;
-        let square_m_per_pa = per_m * kernel.inverse_reduced_modulus_per_pa() * self.cell_m;
-        let (unit, wide) = (self.influence.at(0, 0), kernel.uniform_stiffness_pa_per_m() * square_m_per_pa);
+        let unit_m_per_pa = self.influence.at(0, 0) + self.series_m_per_pa;
         for &(cell, share) in shares {
-            let growth = (1.0 + wide) / (share.sqrt() + share * wide);
-            self.own_m_per_pa[cell] = unit * (growth - 1.0) + self.series_m_per_pa * (1.0 / share - 1.0);
+            self.own_m_per_pa[cell] = unit_m_per_pa * (1.0 / share - 1.0);
         }
     }
 
@@ -479,7 +476,6 @@ fn finite_dot(pressure: &[f64], target: &[f64]) -> f64 {
 /// assert!(outcome.converged && (outcome.approach_m / hertz_m - 1.0).abs() < 5e-3);
 /// ```
 pub struct ElasticSolver {
-    kernel: ElasticKernel,
     shape: [usize; 2],
     planners: Planners,
     levels: Vec<Level>,
@@ -500,7 +496,7 @@ impl ElasticSolver {
     pub fn new(kernel: ElasticKernel, shape: [usize; 2], cell_m: f64) -> Self {
         let tables = tables(kernel, shape, cell_m);
         let levels = tables.iter().map(|(influence, side_m)| Level::new(Arc::clone(influence), *side_m)).collect();
-        Self { kernel, shape, planners: Planners::new(), levels, memory: Memory::default() }
+        Self { shape, planners: Planners::new(), levels, memory: Memory::default() }
     }
 
     /// Rise of the surface beside a wide load relative to the depression under it; see [`Influence::bulge`].
@@ -565,7 +561,7 @@ impl ElasticSolver {
         let top = &mut self.levels[0];
         top.target.clear();
         top.target.extend_from_slice(target_m);
-        top.set_shares(&self.kernel, target_m.len(), shares);
+        top.set_shares(target_m.len(), shares);
         let warm = self.memory.start(patch, target_m, &mut top.pressure);
         let mut outcome = if warm {
             self.on_window(0, shape, Patch::whole(shape), None, tolerance)
@@ -614,7 +610,7 @@ impl ElasticSolver {
             return self.free(height_m.len(), false);
         }
         let top = &mut self.levels[0];
-        top.set_shares(&self.kernel, height_m.len(), &[]);
+        top.set_shares(height_m.len(), &[]);
         top.target.clear();
         top.target.extend(height_m.iter().map(|h| -h));
         self.nested(0, self.shape, Some(force_n), tolerance)

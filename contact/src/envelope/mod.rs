@@ -88,7 +88,7 @@ impl Envelope {
     /// Whether the last body without a map has a rim in a cell.
     #[cfg(test)]
     pub(crate) fn has_parts(&self, cell: usize) -> bool {
-        self.known.parts.marked().contains(&cell)
+        self.known.parts.marked().contains(&[cell / self.raster.cols, cell % self.raster.cols])
     }
 
     /// Where a part is, (x, y), m.
@@ -216,8 +216,8 @@ impl Envelope {
             }
         });
         parts.finish();
-        for cell in parts.marked() {
-            self.depth_m[*cell] = 0.0;
+        for [row, col] in parts.marked() {
+            self.depth_m[row * raster.cols + col] = 0.0;
         }
         self.parts.extend(below(&parts.list, level_m));
         self.place_parts();
@@ -468,7 +468,7 @@ impl KnownBody {
         let holds = |[row, col]: [usize; 2]| {
             (patch.rows[0]..patch.rows[1]).contains(&row) && (patch.cols[0]..patch.cols[1]).contains(&col)
         };
-        for at in parts.marked().iter().map(|cell| place(*cell)).filter(|at| holds(*at)) {
+        for at in parts.marked().iter().copied().filter(|at| holds(*at)) {
             map.drop_m[number(at)] = f64::NEG_INFINITY;
         }
         for part in &parts.list {

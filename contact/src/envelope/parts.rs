@@ -30,8 +30,8 @@ pub(crate) fn split_cell<'a>(parts: &mut &'a [Part], cell: usize) -> &'a [Part] 
 /// The parts of a body at a stand.
 #[derive(Debug, Clone, Default)]
 pub(super) struct Parts {
-    /// Cells that have parts, in order.
-    marked: Vec<usize>,
+    /// Rows and columns of the cells that have parts, in order.
+    marked: Vec<[usize; 2]>,
     /// Height of the lowest point, m, from which bins of heights count, and the height of an even bin.
     lowest_m: f64,
     bin_m: f64,
@@ -55,7 +55,7 @@ const EVEN_BIN: f64 = 0.25;
 const LOWER_BINS: u32 = 10;
 const EVEN_BINS: u32 = 64;
 /// Parts smaller than this share of a cell are round-off.
-const LEAST_SHARE: f64 = 1e-9;
+const LEAST_SHARE: f64 = 1e-7;
 /// Corners of a triangle that is cut by the four sides of a cell and by a height.
 const MOST_CORNERS: usize = 9;
 
@@ -79,8 +79,8 @@ impl Parts {
         self.list.clear();
     }
 
-    /// The cells that have parts.
-    pub(super) fn marked(&self) -> &[usize] {
+    /// Rows and columns of the cells that have parts.
+    pub(super) fn marked(&self) -> &[[usize; 2]] {
         &self.marked
     }
 
@@ -98,21 +98,17 @@ impl Parts {
             let (first, last) = (at((row as f64 - 0.5).max(a[1])), at((row as f64 + 0.5).min(b[1])));
             let [first, last] = if first.is_nan() || last.is_nan() { [a[0], b[0]] } else { [first, last] };
             let cols = cells_between(first.min(last), first.max(last), raster.cols);
-            self.marked.extend(cols.map(|col| row * raster.cols + col));
+            self.marked.extend(cols.map(|col| [row, col]));
         }
     }
 
     /// Adds what a triangle has of the marked cells. Corners are (u, v, height).
     pub(super) fn add(&mut self, raster: &Raster, corners: [[f64; 3]; 3]) {
         let area = cross(corners[0], corners[1], [corners[2][0], corners[2][1]]);
-        if self.marked.is_empty() || area.abs() <= raster.slack {
+        if self.marked.is_empty() || area.abs() <= raster.slack.max(LEAST_SHARE) {
             return;
         }
         let [a, b, c] = if area > 0.0 { corners } else { [corners[0], corners[2], corners[1]] };
-        let span = |k: usize, count| cells_between(least([a[k], b[k], c[k]]), most([a[k], b[k], c[k]]), count);
-        let (rows, cols) = (span(1, raster.rows), span(0, raster.cols));
-        let (Some(first), Some(last)) = (rows.clone().next(), rows.clone().last()) else { return };
-        let from = self.marked.partition_point(|cell| *cell < first * raster.cols);
         let edges = [(b, c), (c, a), (a, b)];
         let by_col = edges.map(|(from, to)| from[1] - to[1]);
         let by_row = edges.map(|(from, to)| to[0] - from[0]);
@@ -120,13 +116,16 @@ impl Parts {
         let scale = 1.0 / area.abs();
         let rise = [b[2] - a[2], c[2] - a[2]];
         let slope = [by_col, by_row].map(|by| (by[1] * rise[0] + by[2] * rise[1]) * scale);
-        for k in from..self.marked.len() {
-            let cell = self.marked[k];
-            let (row, col) = (cell / raster.cols, cell % raster.cols);
-            if row > last {
+        let half_m = 0.5 * (slope[0].abs() + slope[1].abs());
+        let span = |k: usize, count| cells_between(least([a[k], b[k], c[k]]), most([a[k], b[k], c[k]]), count);
+        let (rows, cols) = (span(1, raster.rows), span(0, raster.cols));
+        let first = self.marked.partition_point(|[row, _]| *row < rows.start);
+        for k in first..self.marked.len() {
+            let [row, col] = self.marked[k];
+            if row >= rows.end {
                 break;
             }
-            if !cols.contains(&col) {
+            if col < cols.start || col >= cols.end {
                 continue;
             }
             let p = [col as f64, row as f64];
@@ -134,17 +133,19 @@ impl Parts {
             if (0..3).any(|k| w[k] <= -reach[k]) {
                 continue;
             }
-            let height_m = a[2] + (w[1] * rise[0] + w[2] * rise[1]) * scale;
-            let whole = (0..3).all(|k| w[k] >= reach[k]);
-            let half_m = 0.5 * (slope[0].abs() + slope[1].abs());
-            let bins = [-half_m, half_m].map(|off| self.bin(height_m + off - self.lowest_m));
-            if whole && bins[0] == bins[1] {
-                self.push(cell, bins[0], [1.0, height_m, p[0], p[1]]);
-                continue;
+            let cell = row * raster.cols + col;
+            if (0..3).all(|k| w[k] >= reach[k]) {
+                let height_m = a[2] + (w[1] * rise[0] + w[2] * rise[1]) * scale;
+                let bins = [-half_m, half_m].map(|off| self.bin(height_m + off - self.lowest_m));
+                if bins[0] == bins[1] {
+                    self.push(cell, bins[0], [1.0, height_m, p[0], p[1]]);
+                    continue;
+                }
             }
             let mut polygon = Polygon::from([a, b, c]);
-            for (axis, at) in [(0, p[0]), (1, p[1])] {
-                polygon = polygon.below(axis, 1.0, at + 0.5).below(axis, -1.0, 0.5 - at);
+            for (axis, at) in [(1, p[1]), (0, p[0])] {
+                polygon.cut(axis, 1.0, at + 0.5);
+                polygon.cut(axis, -1.0, 0.5 - at);
             }
             self.cut(cell, polygon);
         }
@@ -152,8 +153,7 @@ impl Parts {
 
     /// Cuts a polygon of a cell at the borders of the bins.
     fn cut(&mut self, cell: usize, polygon: Polygon) {
-        let heights = polygon.corners().iter().map(|p| p[2]);
-        let (low_m, high_m) = heights.fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), z| (l.min(z), h.max(z)));
+        let [low_m, high_m] = polygon.span(2);
         if low_m > high_m {
             return;
         }
@@ -163,7 +163,9 @@ impl Parts {
             let below = if bin >= last {
                 polygon.sums()
             } else {
-                polygon.below(2, 1.0, self.lowest_m + self.top_m(bin)).sums()
+                let mut below = polygon;
+                below.cut(2, 1.0, self.lowest_m + self.top_m(bin));
+                below.sums()
             };
             let sums = [0, 1, 2, 3].map(|k| below[k] - before[k]);
             if sums[0] > LEAST_SHARE * LEAST_SHARE {
@@ -210,14 +212,14 @@ impl Parts {
 
     /// Joins the pieces to parts. Where layers of a body lie above each other, the lowest count first.
     pub(super) fn finish(&mut self) {
-        self.pieces.sort_unstable_by(|p, q| {
-            let mean_m = |p: &Piece| p.sums[1] / p.sums[0];
-            let heights = || mean_m(p).total_cmp(&mean_m(q));
-            (p.cell, p.bin).cmp(&(q.cell, q.bin)).then_with(heights).then(p.order.cmp(&q.order))
-        });
+        self.pieces.sort_unstable_by_key(|p| (p.cell, p.bin, p.order));
         let mut left = 1.0;
-        for pieces in self.pieces.chunk_by(|p, q| (p.cell, p.bin) == (q.cell, q.bin)) {
+        for pieces in self.pieces.chunk_by_mut(|p, q| (p.cell, p.bin) == (q.cell, q.bin)) {
             let cell = pieces[0].cell;
+            if pieces.iter().map(|p| p.sums[0]).sum::<f64>() > 1.0 + LEAST_SHARE {
+                let mean_m = |p: &Piece| p.sums[1] / p.sums[0];
+                pieces.sort_unstable_by(|p, q| mean_m(p).total_cmp(&mean_m(q)).then(p.order.cmp(&q.order)));
+            }
             if self.list.last().is_none_or(|part| part.cell != cell) {
                 left = 1.0;
             }
@@ -271,33 +273,47 @@ impl Polygon {
         &self.corners[..self.count]
     }
 
-    /// The part where `sign` × the coordinate `axis` is at most `bound` (I. E. Sutherland and G. W. Hodgman,
+    /// Smallest and largest coordinate `axis`; out of order without corners.
+    fn span(&self, axis: usize) -> [f64; 2] {
+        let mut span = [f64::INFINITY, f64::NEG_INFINITY];
+        for p in self.corners() {
+            span =
+                [if p[axis] < span[0] { p[axis] } else { span[0] }, if p[axis] > span[1] { p[axis] } else { span[1] }];
+        }
+        span
+    }
+
+    /// Leaves the part where `sign` × the coordinate `axis` is at most `bound` (I. E. Sutherland and G. W. Hodgman,
     /// Communications of the ACM 17 (1974) 32).
-    fn below(&self, axis: usize, sign: f64, bound: f64) -> Self {
-        let mut out = Self { corners: [[0.0; 3]; MOST_CORNERS], count: 0 };
-        let Some(&last) = self.corners().last() else { return out };
+    #[inline]
+    fn cut(&mut self, axis: usize, sign: f64, bound: f64) {
         let over = |p: &[f64; 3]| sign * p[axis] - bound;
-        let (mut before, mut before_over) = (last, over(&last));
+        if self.corners().iter().all(|p| over(p) <= 0.0) {
+            return;
+        }
+        let mut before = self.corners[self.count - 1];
+        let (mut before_over, mut kept) = (over(&before), [[0.0; 3]; MOST_CORNERS]);
+        let mut count = 0;
+        // a convex polygon cut by five lines has no more corners
+        let mut keep = |p: [f64; 3]| {
+            if count < MOST_CORNERS {
+                kept[count] = p;
+                count += 1;
+            }
+        };
         for &p in self.corners() {
             let here = over(&p);
             if (before_over < 0.0 && here > 0.0) || (before_over > 0.0 && here < 0.0) {
                 let share = before_over / (before_over - here);
-                out.push([0, 1, 2].map(|k| before[k] + share * (p[k] - before[k])));
+                keep([0, 1, 2].map(|k| before[k] + share * (p[k] - before[k])));
             }
             if here <= 0.0 {
-                out.push(p);
+                keep(p);
             }
             (before, before_over) = (p, here);
         }
-        out
-    }
-
-    fn push(&mut self, p: [f64; 3]) {
-        // a convex polygon cut by five lines has no more
-        if self.count < MOST_CORNERS {
-            self.corners[self.count] = p;
-            self.count += 1;
-        }
+        self.corners[..count].copy_from_slice(&kept[..count]);
+        self.count = count;
     }
 
     /// Area, and integrals of height, u and v over it.
