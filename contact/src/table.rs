@@ -176,10 +176,10 @@ mod tests {
     }
 
     /// A block, and a pin narrower than a cell, moved in steps of 0.1 mm over two taxels. No place is missed, and the
-    /// middle of the map stays within 0.1 mm of the body's: cells of 2.5 mm do for the block, but a map cannot tell where
-    /// a pin is within a cell, so it needs cells of 0.6 mm. Columns carry the same force everywhere; an elastic surface
-    /// is pressed hardest at an edge, where a cell's mean depends on its place: on four cells a taxel's side and more
-    /// under a block by 1 %, on the two under a pin by 10 %.
+    /// middle of the map stays within 0.1 mm of the body's: cells of 2.5 mm do for the block, but a map cannot tell
+    /// where a pin is within a cell, so it needs cells of 0.6 mm. Columns carry the same force everywhere; an elastic
+    /// surface is pressed hardest at an edge, and what the grid has of that depends on its place: 1 % under the block,
+    /// 10 % under a pin on two cells, half of it under one on a part of a cell.
     #[test]
     fn the_map_follows_the_body() {
         let skin = SkinLayout::default();

@@ -171,8 +171,8 @@ impl Level {
     /// Gives the cells of a patch the share of them that is under the body, those that are not whole.
     ///
     /// On a share c the mean pressure p stands for p/c. As if under that pressure on all of it, the cell sinks by p/c
-    /// times its own coefficient: it is softer by (1/c − 1) of that. So the cells that an edge cuts carry what is theirs
-    /// of the pressure along the edge, and force and centre hardly feel where the edge is within a cell.
+    /// times its own coefficient: it is softer by (1/c − 1) of that. So the cells that an edge cuts carry what is
+    /// theirs of the pressure along the edge, and force and centre hardly feel where the edge is within a cell.
     pub(crate) fn set_shares(&mut self, cells: usize, shares: &[(usize, f64)]) {
         self.own_m_per_pa.clear();
         if shares.is_empty() {

@@ -74,8 +74,8 @@ impl Envelope {
         self.raster.centre_m(row, col)
     }
 
-    /// Depth below the free surface, m, row-major; 0 where nothing dips below it. Of a cell with parts it is that of the
-    /// deepest.
+    /// Depth below the free surface, m, row-major; 0 where nothing dips below it. Of a cell with parts it is that of
+    /// the deepest.
     pub(crate) fn depth_m(&self) -> &[f64] {
         &self.depth_m
     }
@@ -215,7 +215,7 @@ impl Envelope {
                 touched.include(patch);
             }
         });
-        parts.finish();
+        parts.finish(raster);
         for [row, col] in parts.marked() {
             self.depth_m[row * raster.cols + col] = 0.0;
         }
@@ -330,8 +330,8 @@ impl Blocks {
         parts.begin(raster, lowest_m, level_m)
     }
 
-    /// Calls `each` with the corners, (column, row, height above the body's origin in m), and the lowest height of every
-    /// triangle that dips below `level_m` above the origin and may be the lowest somewhere.
+    /// Calls `each` with the corners, (column, row, height above the body's origin in m), and the lowest height of
+    /// every triangle that dips below `level_m` above the origin and may be the lowest somewhere.
     #[inline]
     fn below(&mut self, raster: &Raster, body: &PosedMesh<'_>, level_m: f64, mut each: impl FnMut([[f64; 3]; 3], f64)) {
         let [_, _, up] = body.rotation;
@@ -451,7 +451,7 @@ impl KnownBody {
                 map.triangles.push((span, corners));
             }
         });
-        parts.finish();
+        parts.finish(raster);
         let place = |cell: usize| [cell / raster.cols, cell % raster.cols];
         for [row, col] in parts.list.iter().map(|part| place(part.cell)) {
             map.patch.include(Patch { rows: [row, row + 1], cols: [col, col + 1] });

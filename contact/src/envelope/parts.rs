@@ -32,10 +32,16 @@ pub(crate) fn split_cell<'a>(parts: &mut &'a [Part], cell: usize) -> &'a [Part] 
 pub(super) struct Parts {
     /// Rows and columns of the cells that have parts, in order.
     marked: Vec<[usize; 2]>,
+    /// Which of them have a piece.
+    covered: Vec<bool>,
+    /// Where each row of them begins, from the first on, and the end of the last.
+    lines: Vec<usize>,
+    first_row: usize,
     /// Height of the lowest point, m, from which bins of heights count, and the height of an even bin.
     lowest_m: f64,
     bin_m: f64,
     pieces: Vec<Piece>,
+    walls: Vec<[[f64; 3]; 3]>,
     /// In the order of cells, the lowest of each first; depths are below the body's origin.
     pub(super) list: Vec<Part>,
 }
@@ -43,30 +49,44 @@ pub(super) struct Parts {
 /// What a triangle has of a cell in one bin of heights: area, and integrals of height, column and row over it.
 #[derive(Debug, Clone, Copy)]
 struct Piece {
-    cell: usize,
-    bin: u32,
+    /// Number of the marked cell, and the bin.
+    key: u64,
     order: u32,
     sums: [f64; 4],
 }
 
-/// Heights are told apart by bins. The lowest is 2⁻¹² of a cell high; from there on each is as high as all before it up
-/// to a quarter of a cell; then they are even, and from 16 cells on, where no foam reaches, as high as all before again.
+/// Heights are told apart by bins. The lowest is 2⁻¹² of a cell high; from there on each is as high as all before it,
+/// up to a quarter of a cell; then they are even; and from 16 cells on, where no foam reaches, as high as all before.
 const EVEN_BIN: f64 = 0.25;
 const LOWER_BINS: u32 = 10;
 const EVEN_BINS: u32 = 64;
+/// A surface that rises by more than this is a wall: of a body at depth δ it leaves out a strip of at most δ/20.
+const STEEP: f64 = 20.0;
 /// Parts smaller than this share of a cell are round-off.
 const LEAST_SHARE: f64 = 1e-7;
 /// Corners of a triangle that is cut by the four sides of a cell and by a height.
-const MOST_CORNERS: usize = 9;
+const MOST_CORNERS: usize = 8;
 
 impl Parts {
-    /// Begins with the cells that the surface turns in, for a body whose lowest point is at `lowest_m`. Returns how high
-    /// a triangle may begin and still belong to a part below `level_m`.
+    /// Begins with the marked cells, for a body whose lowest point is at `lowest_m`. Returns the height below which a
+    /// triangle may belong to a part below `level_m`.
     pub(super) fn begin(&mut self, raster: &Raster, lowest_m: f64, level_m: f64) -> f64 {
         self.marked.sort_unstable();
         self.marked.dedup();
         self.pieces.clear();
+        self.walls.clear();
         self.list.clear();
+        self.covered.clear();
+        self.covered.resize(self.marked.len(), false);
+        self.lines.clear();
+        self.lines.push(0);
+        self.first_row = self.marked.first().map_or(0, |[row, _]| *row);
+        for (k, [row, _]) in self.marked.iter().enumerate() {
+            while self.lines.len() <= row - self.first_row {
+                self.lines.push(k);
+            }
+        }
+        self.lines.push(self.marked.len());
         (self.lowest_m, self.bin_m) = (lowest_m, EVEN_BIN * raster.cell_m);
         if self.marked.is_empty() || !level_m.is_finite() {
             return level_m;
@@ -102,10 +122,29 @@ impl Parts {
         }
     }
 
-    /// Adds what a triangle has of the marked cells. Corners are (u, v, height).
+    /// Adds what a triangle has of the marked cells. Corners are (u, v, height). Walls wait: they count only where
+    /// there is nothing else.
+    #[inline]
     pub(super) fn add(&mut self, raster: &Raster, corners: [[f64; 3]; 3]) {
+        if self.marked.is_empty() {
+            return;
+        }
+        let [a, b, c] = corners;
+        let area = cross(a, b, [c[0], c[1]]);
+        let rise = [b[2] - a[2], c[2] - a[2]];
+        let across = [0, 1].map(|k| rise[0] * (c[k] - a[k]) - rise[1] * (b[k] - a[k]));
+        let per_cell = raster.cell_m * STEEP;
+        if across[0] * across[0] + across[1] * across[1] > (area * area) * (per_cell * per_cell) {
+            self.walls.push(corners);
+        } else {
+            self.add_to(raster, corners, |_| true);
+        }
+    }
+
+    /// Adds what a triangle has of those marked cells that are wanted of their number.
+    fn add_to(&mut self, raster: &Raster, corners: [[f64; 3]; 3], wanted: impl Fn(usize) -> bool) {
         let area = cross(corners[0], corners[1], [corners[2][0], corners[2][1]]);
-        if self.marked.is_empty() || area.abs() <= raster.slack.max(LEAST_SHARE) {
+        if area.abs() <= raster.slack.max(LEAST_SHARE) {
             return;
         }
         let [a, b, c] = if area > 0.0 { corners } else { [corners[0], corners[2], corners[1]] };
@@ -117,42 +156,48 @@ impl Parts {
         let rise = [b[2] - a[2], c[2] - a[2]];
         let slope = [by_col, by_row].map(|by| (by[1] * rise[0] + by[2] * rise[1]) * scale);
         let half_m = 0.5 * (slope[0].abs() + slope[1].abs());
-        let span = |k: usize, count| cells_between(least([a[k], b[k], c[k]]), most([a[k], b[k], c[k]]), count);
-        let (rows, cols) = (span(1, raster.rows), span(0, raster.cols));
-        let first = self.marked.partition_point(|[row, _]| *row < rows.start);
-        for k in first..self.marked.len() {
-            let [row, col] = self.marked[k];
-            if row >= rows.end {
-                break;
-            }
-            if col < cols.start || col >= cols.end {
-                continue;
-            }
-            let p = [col as f64, row as f64];
-            let w = edges.map(|(from, to)| cross(from, to, p));
-            if (0..3).any(|k| w[k] <= -reach[k]) {
-                continue;
-            }
-            let cell = row * raster.cols + col;
-            if (0..3).all(|k| w[k] >= reach[k]) {
-                let height_m = a[2] + (w[1] * rise[0] + w[2] * rise[1]) * scale;
-                let bins = [-half_m, half_m].map(|off| self.bin(height_m + off - self.lowest_m));
-                if bins[0] == bins[1] {
-                    self.push(cell, bins[0], [1.0, height_m, p[0], p[1]]);
+        let spans = [0, 1].map(|k| [least([a[k], b[k], c[k]]), most([a[k], b[k], c[k]])]);
+        let rows = cells_between(spans[1][0], spans[1][1], raster.rows);
+        let cols = cells_between(spans[0][0], spans[0][1], raster.cols);
+        let last_row = self.first_row + self.lines.len() - 1;
+        for row in rows.start.max(self.first_row)..rows.end.min(last_row) {
+            let line = self.lines[row - self.first_row]..self.lines[row - self.first_row + 1];
+            let from = line.start + self.marked[line.clone()].partition_point(|[_, col]| *col < cols.start);
+            for k in from..line.end {
+                let [_, col] = self.marked[k];
+                if col >= cols.end {
+                    break;
+                }
+                let p = [col as f64, row as f64];
+                let w = edges.map(|(from, to)| cross(from, to, p));
+                if (0..3).any(|k| w[k] <= -reach[k]) || !wanted(k) {
                     continue;
                 }
+                self.covered[k] = true;
+                if (0..3).all(|k| w[k] >= reach[k]) {
+                    let height_m = a[2] + (w[1] * rise[0] + w[2] * rise[1]) * scale;
+                    let bins = [-half_m, half_m].map(|off| self.bin(height_m + off - self.lowest_m));
+                    if bins[0] == bins[1] {
+                        self.push(k, bins[0], [1.0, height_m, p[0], p[1]]);
+                        continue;
+                    }
+                }
+                let mut polygon = Polygon::from([a, b, c]);
+                for (axis, at, [low, high]) in [(1, p[1], spans[1]), (0, p[0], spans[0])] {
+                    if high > at + 0.5 {
+                        polygon.cut(axis, 1.0, at + 0.5);
+                    }
+                    if low < at - 0.5 {
+                        polygon.cut(axis, -1.0, 0.5 - at);
+                    }
+                }
+                self.cut(k, &polygon);
             }
-            let mut polygon = Polygon::from([a, b, c]);
-            for (axis, at) in [(1, p[1]), (0, p[0])] {
-                polygon.cut(axis, 1.0, at + 0.5);
-                polygon.cut(axis, -1.0, 0.5 - at);
-            }
-            self.cut(cell, polygon);
         }
     }
 
     /// Cuts a polygon of a cell at the borders of the bins.
-    fn cut(&mut self, cell: usize, polygon: Polygon) {
+    fn cut(&mut self, marked: usize, polygon: &Polygon) {
         let [low_m, high_m] = polygon.span(2);
         if low_m > high_m {
             return;
@@ -163,13 +208,13 @@ impl Parts {
             let below = if bin >= last {
                 polygon.sums()
             } else {
-                let mut below = polygon;
+                let mut below = *polygon;
                 below.cut(2, 1.0, self.lowest_m + self.top_m(bin));
                 below.sums()
             };
             let sums = [0, 1, 2, 3].map(|k| below[k] - before[k]);
             if sums[0] > LEAST_SHARE * LEAST_SHARE {
-                self.push(cell, bin, sums);
+                self.push(marked, bin, sums);
             }
             if bin >= last {
                 return;
@@ -178,9 +223,9 @@ impl Parts {
         }
     }
 
-    fn push(&mut self, cell: usize, bin: u32, sums: [f64; 4]) {
+    fn push(&mut self, marked: usize, bin: u32, sums: [f64; 4]) {
         let order = u32::try_from(self.pieces.len()).unwrap_or(u32::MAX);
-        self.pieces.push(Piece { cell, bin, order, sums });
+        self.pieces.push(Piece { key: (marked as u64) << 32 | u64::from(bin), order, sums });
     }
 
     /// The bin of a height above the lowest point.
@@ -211,11 +256,17 @@ impl Parts {
     }
 
     /// Joins the pieces to parts. Where layers of a body lie above each other, the lowest count first.
-    pub(super) fn finish(&mut self) {
-        self.pieces.sort_unstable_by_key(|p| (p.cell, p.bin, p.order));
+    pub(super) fn finish(&mut self, raster: &Raster) {
+        if !self.walls.is_empty() && self.covered.contains(&false) {
+            let (walls, covered) = (std::mem::take(&mut self.walls), self.covered.clone());
+            walls.iter().for_each(|corners| self.add_to(raster, *corners, |k| !covered[k]));
+            self.walls = walls;
+        }
+        self.pieces.sort_unstable_by_key(|p| (p.key, p.order));
         let mut left = 1.0;
-        for pieces in self.pieces.chunk_by_mut(|p, q| (p.cell, p.bin) == (q.cell, q.bin)) {
-            let cell = pieces[0].cell;
+        for pieces in self.pieces.chunk_by_mut(|p, q| p.key == q.key) {
+            let [row, col] = self.marked[usize::try_from(pieces[0].key >> 32).unwrap_or(0)];
+            let cell = row * raster.cols + col;
             if pieces.iter().map(|p| p.sums[0]).sum::<f64>() > 1.0 + LEAST_SHARE {
                 let mean_m = |p: &Piece| p.sums[1] / p.sums[0];
                 pieces.sort_unstable_by(|p, q| mean_m(p).total_cmp(&mean_m(q)).then(p.order.cmp(&q.order)));
@@ -253,27 +304,32 @@ fn cells_between(low: f64, high: f64, count: usize) -> std::ops::Range<usize> {
 /// A point this near to the border of a cell, in cells, counts for both sides.
 const BORDER: f64 = 1e-9;
 
-/// A polygon with few corners.
+/// A convex polygon with few corners.
 #[derive(Clone, Copy)]
 struct Polygon {
-    corners: [[f64; 3]; MOST_CORNERS],
+    /// The corners, and room for those of the next cut.
+    corners: [[[f64; 3]; MOST_CORNERS]; 2],
+    current: usize,
     count: usize,
 }
 
 impl From<[[f64; 3]; 3]> for Polygon {
+    #[inline]
     fn from(triangle: [[f64; 3]; 3]) -> Self {
-        let mut corners = [[0.0; 3]; MOST_CORNERS];
-        corners[..3].copy_from_slice(&triangle);
-        Self { corners, count: 3 }
+        let mut corners = [[[0.0; 3]; MOST_CORNERS]; 2];
+        corners[0][..3].copy_from_slice(&triangle);
+        Self { corners, current: 0, count: 3 }
     }
 }
 
 impl Polygon {
+    #[inline]
     fn corners(&self) -> &[[f64; 3]] {
-        &self.corners[..self.count]
+        &self.corners[self.current][..self.count]
     }
 
     /// Smallest and largest coordinate `axis`; out of order without corners.
+    #[inline]
     fn span(&self, axis: usize) -> [f64; 2] {
         let mut span = [f64::INFINITY, f64::NEG_INFINITY];
         for p in self.corners() {
@@ -288,35 +344,35 @@ impl Polygon {
     #[inline]
     fn cut(&mut self, axis: usize, sign: f64, bound: f64) {
         let over = |p: &[f64; 3]| sign * p[axis] - bound;
-        if self.corners().iter().all(|p| over(p) <= 0.0) {
-            return;
-        }
-        let mut before = self.corners[self.count - 1];
-        let (mut before_over, mut kept) = (over(&before), [[0.0; 3]; MOST_CORNERS]);
+        let (low, high) = self.corners.split_at_mut(1);
+        let (from, to) = if self.current == 0 { (&low[0], &mut high[0]) } else { (&high[0], &mut low[0]) };
         let mut count = 0;
-        // a convex polygon cut by five lines has no more corners
-        let mut keep = |p: [f64; 3]| {
-            if count < MOST_CORNERS {
-                kept[count] = p;
-                count += 1;
+        if let Some(last) = from[..self.count].last() {
+            let (mut before, mut before_over) = (last, over(last));
+            // cut by five lines, a triangle has no more corners than there is room for
+            let mut keep = |p: [f64; 3]| {
+                if count < MOST_CORNERS {
+                    to[count] = p;
+                    count += 1;
+                }
+            };
+            for p in &from[..self.count] {
+                let here = over(p);
+                if (before_over < 0.0 && here > 0.0) || (before_over > 0.0 && here < 0.0) {
+                    let share = before_over / (before_over - here);
+                    keep([0, 1, 2].map(|k| before[k] + share * (p[k] - before[k])));
+                }
+                if here <= 0.0 {
+                    keep(*p);
+                }
+                (before, before_over) = (p, here);
             }
-        };
-        for &p in self.corners() {
-            let here = over(&p);
-            if (before_over < 0.0 && here > 0.0) || (before_over > 0.0 && here < 0.0) {
-                let share = before_over / (before_over - here);
-                keep([0, 1, 2].map(|k| before[k] + share * (p[k] - before[k])));
-            }
-            if here <= 0.0 {
-                keep(p);
-            }
-            (before, before_over) = (p, here);
         }
-        self.corners[..count].copy_from_slice(&kept[..count]);
-        self.count = count;
+        (self.current, self.count) = (1 - self.current, count);
     }
 
     /// Area, and integrals of height, u and v over it.
+    #[inline]
     fn sums(&self) -> [f64; 4] {
         let mut sums = [0.0; 4];
         let [a, rest @ ..] = self.corners() else { return sums };

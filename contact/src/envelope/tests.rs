@@ -174,7 +174,8 @@ fn check(mesh: &TriMesh, rotation: [[f64; 3]; 3], position_m: [f64; 3], cells: u
 
 /// ∫ depth dA over a cell by its parts against samples of the surface, as a mean over the cell: samples miss the border
 /// of what is under the body by half their distance, at two borders; a part, a quarter of a cell high, that reaches
-/// above the skin counts with its mean; and layers that lie above each other in part count as if they did not.
+/// above the skin counts with its mean; layers that lie above each other in part count as if they
+/// did not; and of walls a strip is left out, of a twentieth of the depth, half as deep, on two sides.
 fn parts_check(world: &TriMesh, cell_m: f64, [x, y]: Point, parts: &[Part]) -> Result<(), TestCaseError> {
     const SIDE: u32 = 12;
     let at = |i: u32| cell_m * ((f64::from(i) + 0.5) / f64::from(SIDE) - 0.5);
@@ -186,7 +187,7 @@ fn parts_check(world: &TriMesh, cell_m: f64, [x, y]: Point, parts: &[Part]) -> R
     }
     let found_m: f64 = parts.iter().map(|part| part.share * part.depth_m).sum();
     deepest_m = parts.iter().map(|part| part.depth_m).fold(deepest_m, f64::max);
-    let most_m = 0.15 * deepest_m + cell_m / 32.0;
+    let most_m = 0.15 * deepest_m + cell_m / 32.0 + deepest_m * deepest_m / (20.0 * cell_m);
     prop_assert!((found_m - sum_m).abs() < most_m, "{found_m:e} by parts, {sum_m:e} by samples: {parts:?}");
     Ok(())
 }

@@ -16,8 +16,9 @@ use spts_models::SkinLayout;
 use std::f64::consts::{PI, TAU};
 
 /// On a flat skin it is `winkler`: same points, same law, so the same pressures but for round-off, for all objects,
-/// turned, tilted and moving, on cells without a rim; and the same wrench for a ball, which has none. Depths are good to 1e-15 m of some mm; a cell on a silhouette, within 1e-9 m of
-/// it, may fall on either side: none does at these poses.
+/// turned, tilted and moving, on cells without a rim; and the same wrench for a ball, which has none. Depths are good
+/// to 1e-15 m of some mm; a cell on a silhouette, within 1e-9 m of it, may fall on either side: none does at these
+/// poses.
 #[test]
 fn a_flat_skin_is_winkler() {
     let skin = SkinLayout::default();

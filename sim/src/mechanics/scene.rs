@@ -466,9 +466,8 @@ impl Mechanics {
         Ok(match self.task() {
             Task::Press(press) => {
                 let curve = DepthCurve::up_to_force(field, &body, 1.25 * press.force_n);
-                let square_m = self.skin().pitch_m() / field.cells_per_taxel().max(1) as f64;
                 curve.map_err(|error| match (&error, self.mesh_report()) {
-                    (EquilibriumError::Beside { .. }, Some(report)) => press.beside(report, square_m),
+                    (EquilibriumError::Beside { .. }, Some(report)) => press.beside(report),
                     _ => Refusal::new(format!("`press.force_n` = {}: {error}", press.force_n)),
                 })?
             }
