@@ -32,8 +32,8 @@ pub(crate) fn split_cell<'a>(parts: &mut &'a [Part], cell: usize) -> &'a [Part] 
 pub(super) struct Parts {
     /// Rows and columns of the cells that have parts, in order.
     marked: Vec<[usize; 2]>,
-    /// Which of them have a piece.
-    covered: Vec<bool>,
+    /// The lowest height, m, that each has of what is no wall; infinite without.
+    floor_m: Vec<f64>,
     /// Where each row of them begins, from the first on, and the end of the last.
     lines: Vec<usize>,
     first_row: usize,
@@ -60,7 +60,8 @@ struct Piece {
 const EVEN_BIN: f64 = 0.25;
 const LOWER_BINS: u32 = 10;
 const EVEN_BINS: u32 = 64;
-/// A surface that rises by more than this is a wall: of a body at depth δ it leaves out a strip of at most δ/20.
+/// A surface that rises by more than this is a wall. Where one stands on the rim of a floor it is left out: a strip of at
+/// most 1/20 of the depth.
 const STEEP: f64 = 20.0;
 /// Parts smaller than this share of a cell are round-off.
 const LEAST_SHARE: f64 = 1e-7;
@@ -76,8 +77,8 @@ impl Parts {
         self.pieces.clear();
         self.walls.clear();
         self.list.clear();
-        self.covered.clear();
-        self.covered.resize(self.marked.len(), false);
+        self.floor_m.clear();
+        self.floor_m.resize(self.marked.len(), f64::INFINITY);
         self.lines.clear();
         self.lines.push(0);
         self.first_row = self.marked.first().map_or(0, |[row, _]| *row);
@@ -91,7 +92,8 @@ impl Parts {
         if self.marked.is_empty() || !level_m.is_finite() {
             return level_m;
         }
-        lowest_m + self.top_m(self.bin(level_m - lowest_m))
+        // and the floors that walls of these parts are told apart by
+        lowest_m + self.top_m(self.bin(level_m - lowest_m)) + self.bin_m
     }
 
     pub(super) fn forget(&mut self) {
@@ -123,7 +125,7 @@ impl Parts {
     }
 
     /// Adds what a triangle has of the marked cells. Corners are (u, v, height). Walls wait: they count only where
-    /// there is nothing else.
+    /// they hang far below the rest.
     #[inline]
     pub(super) fn add(&mut self, raster: &Raster, corners: [[f64; 3]; 3]) {
         if self.marked.is_empty() {
@@ -137,12 +139,13 @@ impl Parts {
         if across[0] * across[0] + across[1] * across[1] > (area * area) * (per_cell * per_cell) {
             self.walls.push(corners);
         } else {
-            self.add_to(raster, corners, |_| true);
+            self.add_to(raster, corners, false);
         }
     }
 
-    /// Adds what a triangle has of those marked cells that are wanted of their number.
-    fn add_to(&mut self, raster: &Raster, corners: [[f64; 3]; 3], wanted: impl Fn(usize) -> bool) {
+    /// Adds what a triangle has of the marked cells; of a wall what is below the cell's floor, if it begins more than
+    /// an even bin below it. Other walls stand on the rim of the floor, as those of a block do.
+    fn add_to(&mut self, raster: &Raster, corners: [[f64; 3]; 3], is_wall: bool) {
         let area = cross(corners[0], corners[1], [corners[2][0], corners[2][1]]);
         if area.abs() <= raster.slack.max(LEAST_SHARE) {
             return;
@@ -156,6 +159,7 @@ impl Parts {
         let rise = [b[2] - a[2], c[2] - a[2]];
         let slope = [by_col, by_row].map(|by| (by[1] * rise[0] + by[2] * rise[1]) * scale);
         let half_m = 0.5 * (slope[0].abs() + slope[1].abs());
+        let low_m = least([a[2], b[2], c[2]]);
         let spans = [0, 1].map(|k| [least([a[k], b[k], c[k]]), most([a[k], b[k], c[k]])]);
         let rows = cells_between(spans[1][0], spans[1][1], raster.rows);
         let cols = cells_between(spans[0][0], spans[0][1], raster.cols);
@@ -170,14 +174,15 @@ impl Parts {
                 }
                 let p = [col as f64, row as f64];
                 let w = edges.map(|(from, to)| cross(from, to, p));
-                if (0..3).any(|k| w[k] <= -reach[k]) || !wanted(k) {
+                let hangs = low_m + self.bin_m < self.floor_m[k];
+                if (0..3).any(|k| w[k] <= -reach[k]) || (is_wall && !hangs) {
                     continue;
                 }
-                self.covered[k] = true;
-                if (0..3).all(|k| w[k] >= reach[k]) {
+                if !is_wall && (0..3).all(|k| w[k] >= reach[k]) {
                     let height_m = a[2] + (w[1] * rise[0] + w[2] * rise[1]) * scale;
                     let bins = [-half_m, half_m].map(|off| self.bin(height_m + off - self.lowest_m));
                     if bins[0] == bins[1] {
+                        self.floor_m[k] = self.floor_m[k].min(height_m - half_m);
                         self.push(k, bins[0], [1.0, height_m, p[0], p[1]]);
                         continue;
                     }
@@ -191,18 +196,22 @@ impl Parts {
                         polygon.cut(axis, -1.0, 0.5 - at);
                     }
                 }
-                self.cut(k, &polygon);
+                self.cut(k, &polygon, is_wall);
             }
         }
     }
 
     /// Cuts a polygon of a cell at the borders of the bins.
-    fn cut(&mut self, marked: usize, polygon: &Polygon) {
+    fn cut(&mut self, marked: usize, polygon: &Polygon, is_wall: bool) {
         let [low_m, high_m] = polygon.span(2);
         if low_m > high_m {
             return;
         }
         let (mut bin, last) = (self.bin(low_m - self.lowest_m), self.bin(high_m - self.lowest_m));
+        let floor = if is_wall { self.bin(self.floor_m[marked] - self.lowest_m) } else { u32::MAX };
+        if !is_wall {
+            self.floor_m[marked] = self.floor_m[marked].min(low_m);
+        }
         let mut before = [0.0; 4];
         loop {
             let below = if bin >= last {
@@ -213,10 +222,10 @@ impl Parts {
                 below.sums()
             };
             let sums = [0, 1, 2, 3].map(|k| below[k] - before[k]);
-            if sums[0] > LEAST_SHARE * LEAST_SHARE {
+            if sums[0] > LEAST_SHARE * LEAST_SHARE && bin < floor {
                 self.push(marked, bin, sums);
             }
-            if bin >= last {
+            if bin >= last.min(floor) {
                 return;
             }
             (before, bin) = (below, bin + 1);
@@ -257,11 +266,9 @@ impl Parts {
 
     /// Joins the pieces to parts. Where layers of a body lie above each other, the lowest count first.
     pub(super) fn finish(&mut self, raster: &Raster) {
-        if !self.walls.is_empty() && self.covered.contains(&false) {
-            let (walls, covered) = (std::mem::take(&mut self.walls), self.covered.clone());
-            walls.iter().for_each(|corners| self.add_to(raster, *corners, |k| !covered[k]));
-            self.walls = walls;
-        }
+        let walls = std::mem::take(&mut self.walls);
+        walls.iter().for_each(|corners| self.add_to(raster, *corners, true));
+        self.walls = walls;
         self.pieces.sort_unstable_by_key(|p| (p.key, p.order));
         let mut left = 1.0;
         for pieces in self.pieces.chunk_by_mut(|p, q| p.key == q.key) {

@@ -262,6 +262,23 @@ proptest! {
     }
 }
 
+/// A blade with a sharp edge and walls of 2° that hangs under a wide roof: it is not lost over the roof, and a map made
+/// for all depths has what one made for the depth has.
+#[test]
+fn a_blade_under_a_roof_counts() {
+    let blade = revolve_ring(&[[0.02, 0.0], [0.0203, 0.01], [0.0197, 0.01]], 24);
+    let roof = cuboid([0.06, 0.06, 0.004]).translated([0.0, 0.0, 0.01]);
+    let mesh = blade.merged(&roof);
+    check(&mesh, [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]], [1.1e-3, 0.3e-3, -4e-3], 3).unwrap();
+    let mut envelope = Envelope::new(&SkinLayout::default(), 3);
+    envelope.rasterise(&PosedMesh::at_rest(&mesh, [1.1e-3, 0.3e-3, -4e-3]));
+    let [rows, cols] = envelope.shape();
+    let volume_cells: f64 = envelope.parts(&(0..rows * cols)).iter().map(|part| part.share * part.depth_m).sum();
+    // a ring of 2π · 20 mm and a triangle 4 mm high, 0.24 mm wide below the skin
+    let expected_m3 = std::f64::consts::TAU * 0.02 * 0.5 * 4e-3 * 0.24e-3;
+    assert_relative_eq!(volume_cells * envelope.cell_m().powi(2), expected_m3, max_relative = 0.15);
+}
+
 /// The seventeen objects as they are pressed.
 #[test]
 fn objects_equal_brute_force() {
