@@ -22,8 +22,8 @@ fn presses_settle_at_any_force() {
     }
 }
 
-/// A hard plate and a tilted one, pressed with the largest step: as with a quarter of it. The force on a plateau is held
-/// to 0.1 N, or to what a tilted plate that still turns on its mount leaves, with either step.
+/// A hard plate and a tilted one, pressed with the largest step: as with a quarter of it. The force on a plateau is
+/// held to 0.1 N, or to what a tilted plate that still turns on its mount leaves, with either step.
 #[test]
 fn presses_settle_at_the_limit() {
     for text in [

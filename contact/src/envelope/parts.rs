@@ -60,8 +60,8 @@ struct Piece {
 const EVEN_BIN: f64 = 0.25;
 const LOWER_BINS: u32 = 10;
 const EVEN_BINS: u32 = 64;
-/// A surface that rises by more than this is a wall. Where one stands on the rim of a floor it is left out: a strip of at
-/// most 1/20 of the depth.
+/// A surface that rises by more than this is a wall. Where one stands on the rim of a floor it is left out: a strip of
+/// at most 1/20 of the depth.
 const STEEP: f64 = 20.0;
 /// Parts smaller than this share of a cell are round-off.
 const LEAST_SHARE: f64 = 1e-7;
