@@ -34,7 +34,7 @@ pub(crate) struct Sorted {
     pub(crate) points_m: Vec<[f64; 3]>,
     /// Triangles, as indices into the corners of their block.
     pub(crate) triangles: Vec<[u32; 3]>,
-    /// Edges at which the surface turns or ends, block by block.
+    /// Edges at which the surface turns or ends, the sharpest first.
     pub(crate) rims: Vec<Rim>,
     /// Whether the mesh is closed and its triangles face outwards. Triangles that face up are then never the lowest.
     pub(crate) solid: bool,
@@ -47,16 +47,14 @@ pub(crate) struct Block {
     pub(crate) half_m: [f64; 3],
     pub(crate) points: Range<usize>,
     pub(crate) triangles: Range<usize>,
-    pub(crate) rims: Range<usize>,
 }
 
 impl From<TriMesh> for PreparedMesh {
     fn from(mesh: TriMesh) -> Self {
         let centre = |t: &[u32; 3]| [0, 1, 2].map(|k| t.iter().map(|i| mesh.vertices[*i as usize][k]).sum::<f64>());
         let mut order: Vec<_> = (0..).zip(&mesh.triangles).map(|(i, t)| (centre(t), i)).collect();
-        let rims = mesh.rims();
-        let mut sorted = Sorted { solid: mesh.is_solid(), source: mesh, ..Sorted::default() };
-        sorted.split(&mut order, &rims);
+        let mut sorted = Sorted { solid: mesh.is_solid(), rims: mesh.rims(), source: mesh, ..Sorted::default() };
+        sorted.split(&mut order);
         Self(Arc::new(sorted))
     }
 }
@@ -89,9 +87,9 @@ impl PreparedMesh {
 impl Sorted {
     /// Halves the triangles, each with three times its centre, along the longest side of the box around their centres
     /// until they make a block.
-    fn split(&mut self, triangles: &mut [([f64; 3], u32)], rims: &[(u32, Rim)]) {
+    fn split(&mut self, triangles: &mut [([f64; 3], u32)]) {
         if triangles.len() <= BLOCK {
-            self.push(triangles, rims);
+            self.push(triangles);
             return;
         }
         let [low, high] = span(triangles.iter().map(|(centre, _)| *centre));
@@ -100,16 +98,14 @@ impl Sorted {
         let middle = triangles.len() / 2;
         triangles.select_nth_unstable_by(middle, |(s, _), (t, _)| s[longest].total_cmp(&t[longest]));
         let (below, above) = triangles.split_at_mut(middle);
-        self.split(below, rims);
-        self.split(above, rims);
+        self.split(below);
+        self.split(above);
     }
 
-    fn push(&mut self, triangles: &[([f64; 3], u32)], rims: &[(u32, Rim)]) {
-        let (first_point, first_triangle, first_rim) = (self.points_m.len(), self.triangles.len(), self.rims.len());
+    fn push(&mut self, triangles: &[([f64; 3], u32)]) {
+        let (first_point, first_triangle) = (self.points_m.len(), self.triangles.len());
         let mut known: Vec<u32> = Vec::with_capacity(3 * BLOCK);
         for (_, t) in triangles {
-            let own = rims.partition_point(|(triangle, _)| triangle < t);
-            self.rims.extend(rims[own..].iter().take_while(|(triangle, _)| triangle == t).map(|(_, rim)| *rim));
             let local = self.source.triangles[*t as usize].map(|i| {
                 let at = known.iter().position(|&k| k == i).unwrap_or_else(|| {
                     known.push(i);
@@ -126,7 +122,6 @@ impl Sorted {
             half_m: [0, 1, 2].map(|k| 0.5 * (high[k] - low[k])),
             points: first_point..self.points_m.len(),
             triangles: first_triangle..self.triangles.len(),
-            rims: first_rim..self.rims.len(),
         });
     }
 }

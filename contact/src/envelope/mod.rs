@@ -318,13 +318,11 @@ impl Blocks {
         let lowest_m = self.lowest_point_m(up);
         if lowest_m < level_m {
             let to_cells = ToCells::of(raster, body);
-            let sorted = self.mesh.sorted();
-            for block in sorted.blocks.iter().filter(|block| block.lowest_m(up) < level_m) {
-                for rim in &sorted.rims[block.rims.clone()] {
-                    if rim.radius_m < FINE * raster.cell_m {
-                        parts.mark(raster, rim.ends_m.map(|p| to_cells.place(&p)));
-                    }
-                }
+            // whatever their height, so that a cell has parts at every level or at none
+            let rims = &self.mesh.sorted().rims;
+            let fine = rims.partition_point(|rim| rim.radius_m < FINE * raster.cell_m);
+            for rim in &rims[..fine] {
+                parts.mark(raster, rim.ends_m.map(|p| to_cells.place(&p)));
             }
         }
         parts.begin(raster, lowest_m, level_m)

@@ -250,8 +250,8 @@ impl TriMesh {
         firsts.all(|(_, volume_m3)| *volume_m3 > 0.0)
     }
 
-    /// The edges at which the surface turns or ends, each with the number of one of its triangles, in their order.
-    pub(crate) fn rims(&self) -> Vec<(u32, Rim)> {
+    /// The edges at which the surface turns or ends, the sharpest first.
+    pub(crate) fn rims(&self) -> Vec<Rim> {
         let sides = Sides::of(self);
         let point = |i: u32| self.vertices[i as usize];
         // vector along the normal, of twice the triangle's area
@@ -277,10 +277,10 @@ impl TriMesh {
                     _ => 0.0,
                 };
                 // a flat edge has no radius; one without a length is no edge
-                (radius_m < f64::INFINITY).then_some((edge[0].triangle, Rim { ends_m, radius_m }))
+                (radius_m < f64::INFINITY).then_some(Rim { ends_m, radius_m })
             })
             .collect();
-        rims.sort_by_key(|(triangle, _)| *triangle);
+        rims.sort_by(|a, b| a.radius_m.total_cmp(&b.radius_m));
         rims
     }
 
