@@ -58,3 +58,30 @@ fn a_saved_scene_changes_its_fidelity_level() {
         "{scene}"
     );
 }
+
+/// The full chain beside the chosen one: scores of both, the difference of what was asked for and whether it is within;
+/// and errors that are asked for on scenes that no table was measured on. Without a tolerance there is nothing to check.
+#[test]
+fn tolerances_are_checked() {
+    let dir = tempfile::tempdir().unwrap();
+    let arguments = ["simulate", "press/tennis", "--no-record", "--tolerance", "0.1", "--check", "--json"];
+    let report = json(dir.path(), &arguments);
+    let check = &report["check"];
+    assert_eq!((&check["met"], &check["tolerance"]), (&true.into(), &0.1.into()), "{check}");
+    assert!(check["difference"].as_f64().unwrap() <= 0.1 && check["saves"].as_f64().unwrap() > 2.0, "{check}");
+    for chain in ["chosen", "full"] {
+        for key in words("cells_per_taxel timestep_s support iou class contact_s readout_s") {
+            assert!(check[chain][key].is_number(), "{chain} {key}: {check}");
+        }
+    }
+    assert_eq!(check["full"]["cells_per_taxel"], 24);
+    let error = fails(dir.path(), &["simulate", "press/T", "--check"]);
+    assert!(error.contains("--tolerance"), "{error}");
+    let report = json(dir.path(), &["fidelity", "--tolerances", "0.1,0.3", "--scenes", "2", "--seed", "3", "--json"]);
+    let rows = report["rows"].as_array().unwrap();
+    assert_eq!(rows.len() + 2 * report["refused"].as_array().unwrap().len(), 4);
+    for row in rows {
+        assert!(row["error"].as_f64().unwrap() <= row["tolerance"].as_f64().unwrap(), "{row}");
+    }
+    assert!(dir.path().join("out/fidelity/tolerances.csv").exists());
+}

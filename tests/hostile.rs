@@ -352,7 +352,7 @@ contact.cells_per_taxel = 1000000000 ; P | cells_per_taxel
 contact.friction = "some" ; P | `contact.friction` = "some": a number is needed
 rows.seeds = [-1] ; P | a whole number in [0, 2^32) is needed
 timestep_s = true ; P | `timestep_s` = true: 
-chosen_for_tolerance = nan ; P | `chosen_for_tolerance` = NaN is outside (0, 1]
+chosen_for_tolerance = nan ; P | `chosen_for_tolerance` = NaN is outside [0.03, 1]
 frame_interval_s = inf ; P | `frame_interval_s` = inf is outside [timestep_s, 0.1] s
 [transducer_parameters] ; gains = "short.toml" ; P | gains.log_mean.length` = 1 | one value a taxel
 [transducer_parameters] ; gains = "nothing.toml" ; P | `gains` | nothing.toml

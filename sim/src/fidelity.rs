@@ -1,6 +1,12 @@
 //! Fidelity levels of the contact: the measured cost and error of each, and the choice of one for a given tolerance.
 
-use serde::{Deserialize, Serialize};
+use crate::mechanics::{Mechanics, Task};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
+use spts_contact::{Holder, Load, PosedMesh, TaxelBins, build_contact};
+use spts_input::Refusal;
+use spts_models::{PressureMap, SkinLayout, in_interval};
+use std::fmt;
+use std::str::FromStr;
 use std::sync::OnceLock;
 
 /// A fidelity level: a contact model, with or without dynamics.
@@ -16,26 +22,53 @@ pub struct FidelityLevel {
     pub coupled: Option<bool>,
     /// Whether MuJoCo simulates the dynamics; only then are there a time step and bounces.
     pub dynamic: bool,
+    /// What it leaves out.
+    pub leaves_out: &'static str,
 }
 
 /// Every fidelity level, the cheapest first. The last but one is the reference.
 pub const LEVELS: &[FidelityLevel] = &[
-    level("footprint", "columns, at rest", "footprint", None, false),
-    level("winkler", "columns", "winkler", None, true),
-    level("layer_after", "layer, frames only", "layer", Some(false), true),
-    level("layer", "layer", "layer", Some(true), true),
-    level("half_space", "half-space", "half_space", Some(true), true),
+    FidelityLevel {
+        name: "footprint",
+        label: "columns, at rest",
+        model: "footprint",
+        coupled: None,
+        dynamic: false,
+        leaves_out: "the arm's motion, and that the foam is pulled down beside a load",
+    },
+    FidelityLevel {
+        name: "winkler",
+        label: "columns",
+        model: "winkler",
+        coupled: None,
+        dynamic: true,
+        leaves_out: "that the foam is pulled down beside a load",
+    },
+    FidelityLevel {
+        name: "layer_after",
+        label: "layer, frames only",
+        model: "layer",
+        coupled: Some(false),
+        dynamic: true,
+        leaves_out: "that the foam is pulled down beside a load, in the motion; frames have it",
+    },
+    FidelityLevel {
+        name: "layer",
+        label: "layer",
+        model: "layer",
+        coupled: Some(true),
+        dynamic: true,
+        leaves_out: "nothing but finer cells",
+    },
+    FidelityLevel {
+        name: "half_space",
+        label: "half-space",
+        model: "half_space",
+        coupled: Some(true),
+        dynamic: true,
+        leaves_out: "the base under the foam",
+    },
 ];
-
-const fn level(
-    name: &'static str,
-    label: &'static str,
-    model: &'static str,
-    coupled: Option<bool>,
-    dynamic: bool,
-) -> FidelityLevel {
-    FidelityLevel { name, label, model, coupled, dynamic }
-}
 
 /// Name of the level with which the others are compared.
 pub const REFERENCE: &str = "layer";
@@ -113,22 +146,6 @@ pub struct MeasuredSetting {
     pub class_delta: f64,
 }
 
-/// The cheapest contact model, grid and time step that meet a wanted error, from the table that `spts fidelity`
-/// measured.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct FidelityChoice {
-    /// The fidelity level.
-    pub level: &'static FidelityLevel,
-    /// Grid squares along one side of a taxel.
-    pub cells_per_taxel: usize,
-    /// Time step of the dynamics, s.
-    pub timestep_s: f64,
-    /// Largest error of the taxels' pressures over the scenes of this task.
-    pub taxel_rms_rel: f64,
-    /// Mean cost over the scenes of this task, in seconds a simulated second.
-    pub cost_s_per_s: f64,
-}
-
 /// The shipped table, measured by `spts fidelity`: default skin and foam, 20 N.
 pub fn measured() -> &'static [MeasuredSetting] {
     static TABLE: OnceLock<Vec<MeasuredSetting>> = OnceLock::new();
@@ -139,65 +156,394 @@ pub fn measured() -> &'static [MeasuredSetting] {
     })
 }
 
-/// The cheapest level, resolution and time step in `table` whose largest error of the taxels' pressures over all scenes
-/// of `task` ("press" or "drop") is at most `tolerance`; `None` if there is none.
+// A tolerance: what a scene may err by.
+
+/// The error that a scene may have, against the finest level.
+///
+/// In a scene: `tolerance = 0.05`, `tolerance = { iou = 0.02 }` or `tolerance = { class = 0.01 }`.
 ///
 /// ```
-/// use spts_sim::fidelity::{cheapest, measured};
+/// use spts_sim::fidelity::Tolerance;
 ///
-/// let rough = cheapest(measured(), "press", 0.5).expect("a level meets 50 %");
-/// let exact = cheapest(measured(), "press", 0.05).expect("a level meets 5 %");
-/// assert!(rough.cost_s_per_s <= exact.cost_s_per_s && exact.taxel_rms_rel <= 0.05);
+/// assert_eq!("0.05".parse(), Ok(Tolerance::Pressure(0.05)));
+/// assert_eq!("iou=0.02".parse(), Ok(Tolerance::Iou(0.02)));
+/// // a change of IoU by 0.02 is met by pressures with about this error, in every row of the shipped table
+/// let error = Tolerance::Iou(0.02).pressure("press").expect("in the table");
+/// assert!(error > 0.005 && error < 0.2);
 /// ```
-pub fn cheapest(table: &[MeasuredSetting], task: &str, tolerance: f64) -> Option<FidelityChoice> {
-    let rows: Vec<&MeasuredSetting> = table.iter().filter(|row| row.task == task).collect();
-    let mut scenes: Vec<&str> = rows.iter().map(|row| row.scene.as_str()).collect();
-    scenes.sort_unstable();
-    scenes.dedup();
-    let mut best: Option<FidelityChoice> = None;
-    for row in &rows {
-        let alike: Vec<&&MeasuredSetting> = rows.iter().filter(|other| same_setting(other, row)).collect();
-        let Some(level) = FidelityLevel::named(&row.level) else {
-            continue;
-        };
-        let choice = FidelityChoice {
-            level,
-            cells_per_taxel: row.cells_per_taxel,
-            timestep_s: row.timestep_s,
-            taxel_rms_rel: alike.iter().map(|r| r.taxel_rms_rel).fold(0.0, f64::max),
-            cost_s_per_s: alike.iter().map(|r| r.cost_s_per_s).sum::<f64>() / alike.len() as f64,
-        };
-        // a setting that some scene refused was not measured to meet anything
-        let complete = alike.len() == scenes.len();
-        let cheaper = best.is_none_or(|b| choice.cost_s_per_s < b.cost_s_per_s);
-        if complete && choice.taxel_rms_rel <= tolerance && cheaper {
-            best = Some(choice);
-        }
-    }
-    best
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Tolerance {
+    /// Relative root mean square error of the taxels' pressures over the scene.
+    Pressure(f64),
+    /// Change of the mean intersection over union of supports.
+    Iou(f64),
+    /// Change of the share of windows that are classified correctly.
+    Class(f64),
 }
 
-fn same_setting(a: &MeasuredSetting, b: &MeasuredSetting) -> bool {
-    a.level == b.level
-        && a.cells_per_taxel == b.cells_per_taxel
-        && (a.timestep_s - b.timestep_s).abs() <= 1e-9 * b.timestep_s
+/// What can be written for a tolerance.
+const WANTED: &str = "a number, { iou = number } or { class = number }";
+
+impl Tolerance {
+    /// Name of the score if it is of one, value, and the range that it may have.
+    fn parts(self) -> (Option<&'static str>, f64, &'static str) {
+        match self {
+            // the margin, the course of the force and frames between two forces come to half of the least
+            Self::Pressure(most) => (None, most, "[0.03, 1]"),
+            Self::Iou(most) => (Some("iou"), most, "[0.005, 0.5]"),
+            Self::Class(most) => (Some("class"), most, "[0.005, 0.5]"),
+        }
+    }
+
+    /// Itself when it is in its range; `key` is its name in a scene, for the error.
+    ///
+    /// # Errors
+    /// [`Refusal`] outside the range.
+    pub fn checked(self, key: &str) -> Result<Self, Refusal> {
+        let (score, most, range) = self.parts();
+        in_interval(&score.map_or(key.to_owned(), |score| format!("{key}.{score}")), most, range)?;
+        Ok(self)
+    }
+
+    /// Error of the pressures that meets it: for a score the largest in the shipped table up to which every row of
+    /// `task` ("press" or "drop") keeps to it; `None` if no row does.
+    pub fn pressure(self, task: &str) -> Option<f64> {
+        let delta = |row: &MeasuredSetting| match self {
+            Self::Pressure(_) => 0.0,
+            Self::Iou(_) => row.iou_delta.abs(),
+            Self::Class(_) => row.class_delta.abs(),
+        };
+        let (_, most, _) = self.parts();
+        if let Self::Pressure(_) = self {
+            return Some(most);
+        }
+        let rows = || measured().iter().filter(|row| row.task == task);
+        let misses = rows().filter(|row| delta(row) > most).map(|row| row.taxel_rms_rel);
+        let first = misses.fold(f64::INFINITY, f64::min);
+        let met = rows().map(|row| row.taxel_rms_rel).filter(|error| *error < first);
+        met.max_by(f64::total_cmp)
+    }
+
+    /// As TOML.
+    pub fn to_toml(self) -> toml::Value {
+        let (score, most, _) = self.parts();
+        match score {
+            None => most.into(),
+            Some(score) => toml::Table::from_iter([(score.to_owned(), most.into())]).into(),
+        }
+    }
+
+    fn of(score: &str, most: f64) -> Option<Self> {
+        match score {
+            "iou" => Some(Self::Iou(most)),
+            "class" => Some(Self::Class(most)),
+            _ => None,
+        }
+    }
+}
+
+impl fmt::Display for Tolerance {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::Pressure(most) => write!(f, "{most}"),
+            Self::Iou(most) => write!(f, "{most} of IoU"),
+            Self::Class(most) => write!(f, "{most} of the classification"),
+        }
+    }
+}
+
+impl FromStr for Tolerance {
+    type Err = String;
+
+    fn from_str(text: &str) -> Result<Self, String> {
+        let number =
+            |text: &str| text.trim().parse().map_err(|_| "a number, iou=number or class=number is needed".to_owned());
+        match text.split_once('=') {
+            None => number(text).map(Self::Pressure),
+            Some((score, most)) => {
+                let score = score.trim();
+                let of = Self::of(score, f64::NAN).map(|_| ());
+                of.ok_or_else(|| format!("`{score}` is not one of iou, class"))?;
+                Ok(Self::of(score, number(most)?).unwrap_or(Self::Pressure(f64::NAN)))
+            }
+        }
+    }
+}
+
+impl Serialize for Tolerance {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        self.to_toml().serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for Tolerance {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        use serde::de::Error;
+        let value = toml::Value::deserialize(deserializer)?;
+        let number = |value: &toml::Value| value.as_float().or_else(|| value.as_integer().map(|i| i as f64));
+        let found = match &value {
+            toml::Value::Table(table) if table.len() == 1 => {
+                table.iter().find_map(|(score, most)| Self::of(score, number(most)?))
+            }
+            value => number(value).map(Self::Pressure),
+        };
+        found.ok_or_else(|| D::Error::custom(format!("`tolerance` = {value} is not {WANTED}")))
+    }
+}
+
+// The choice: every level is tried on the scene's own contact.
+
+/// The cheapest contact model and grid that meet a tolerance on a scene.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct FidelityChoice {
+    /// The fidelity level.
+    pub level: &'static FidelityLevel,
+    /// Grid squares along one side of a taxel.
+    pub cells_per_taxel: usize,
+    /// Expected error of the taxels' pressures.
+    pub error: f64,
+    /// What the finest level itself may be off by: how far its pressures moved when its cells were halved.
+    pub finest_error: f64,
+    /// Times that the finest level takes as long, by the means of the shipped table.
+    pub saves: f64,
+}
+
+/// Resolutions that are tried on skins of the usual pitch or less, those of the shipped table. A larger pitch gets as
+/// many more.
+const CELLS: [usize; 5] = [2, 3, 6, 12, 24];
+/// Resolution of the finest level there, and the most that a taxel can have.
+const FINEST: usize = 24;
+const MOST_CELLS: usize = 64;
+/// Most grid squares of an elastic field.
+const MOST_SQUARES: f64 = (1_u64 << 20) as f64;
+/// What a press at rest is off by because its force follows the course without the arm's dynamics: the largest over
+/// objects, foams and forces from 1 to 100 N.
+const AT_REST: f64 = 0.06;
+/// What columns under the dynamics are off by in the course of the force, against a field that is solved at every step.
+const COURSE: f64 = 0.015;
+/// Share of the tolerance that a held pose may take: other presses of the scene stand a little differently.
+const MARGIN: f64 = 0.9;
+/// The light force or depth that is tried besides the scene's own, relative to that, and the weight of its error.
+const LIGHT: f64 = 0.25;
+const LIGHT_WEIGHT: f64 = 0.5;
+
+/// Tries the levels on the contact of `scene`, a scene of columns, whose other parameters of `[contact]` are `contact`.
+/// Of those that keep to the tolerance it takes the cheapest that the scene `can_have`.
+///
+/// A press is held under its force, and a ball at its deepest. The error of a level is that of the taxels' pressures
+/// there, against `layer` with the most cells that the part of the skin under the body can have, up to 24 a taxel.
+///
+/// # Errors
+/// [`Refusal`] if no level that the scene can have meets the tolerance, with the least error there is.
+pub(crate) fn choose(
+    scene: &Mechanics,
+    contact: &toml::Table,
+    tolerance: Tolerance,
+    can_have: impl Fn(&FidelityLevel, usize) -> bool,
+) -> Result<FidelityChoice, Refusal> {
+    let task = if matches!(scene.task(), Task::Drop(_)) { "drop" } else { "press" };
+    let wanted = tolerance.pressure(task).unwrap_or(0.0);
+    let trial = Trial::new(scene, contact)?;
+    let reference = FidelityLevel::named(REFERENCE).unwrap_or(&LEVELS[0]);
+    let finest = trial.pressures(reference, trial.finest)?;
+    let half = trial.pressures(reference, (trial.finest / 2).max(1))?;
+    let bent = scene.config().bend.is_some();
+    let mut candidates: Vec<(f64, &'static FidelityLevel, usize)> = Vec::new();
+    for level in LEVELS.iter().filter(|level| trial.takes(level) && !(bent && level.coupled.is_some())) {
+        let cells = CELLS.into_iter().map(|cells| (cost(task, level.name, cells), level, on(scene.skin(), cells)));
+        candidates.extend(cells.filter(|(.., cells)| *cells <= trial.most_cells(level)));
+    }
+    candidates.sort_by(|a, b| a.0.total_cmp(&b.0));
+    // a press is held by the same force on every level: two levels of one model feel the same
+    let mut tried: Vec<(bool, usize, f64)> = vec![(true, trial.finest, 0.0)];
+    let mut least = f64::INFINITY;
+    for (cost_s_per_s, level, cells_per_taxel) in candidates {
+        let elastic = level.coupled.is_some();
+        let is_finest = level.name == REFERENCE && cells_per_taxel == trial.finest;
+        let same = tried
+            .iter()
+            .find(|(e, cells, _)| (task == "press" || is_finest) && (*e, *cells) == (elastic, cells_per_taxel));
+        let held = match same {
+            Some((.., held)) => *held,
+            None => difference(&trial.pressures(level, cells_per_taxel)?, &finest),
+        };
+        tried.push((elastic, cells_per_taxel, held));
+        let course = match (level.dynamic, level.coupled) {
+            (false, _) => AT_REST,
+            (true, Some(true)) => 0.0,
+            (true, _) => COURSE,
+        };
+        let error = held.hypot(course);
+        least = least.min(error);
+        if (is_finest || error <= MARGIN * wanted) && can_have(level, cells_per_taxel) {
+            let saves = cost(task, REFERENCE, FINEST) / cost_s_per_s;
+            return Ok(FidelityChoice {
+                level,
+                cells_per_taxel,
+                error,
+                finest_error: difference(&half, &finest),
+                saves,
+            });
+        }
+    }
+    Err(Refusal::new(format!(
+        "`tolerance` = {tolerance}: pressures with an error of at most {wanted:.3} are needed, and the best level that \
+         this scene can have comes to {:.3}{}",
+        least / MARGIN,
+        if bent { ", since a bent skin takes columns alone" } else { "" }
+    )))
+}
+
+/// The finest level that the whole skin of `scene` can have, and its cells along a taxel. A bent skin takes columns alone.
+pub fn finest(scene: &Mechanics) -> (&'static FidelityLevel, usize) {
+    let bent = scene.config().bend.is_some();
+    let level = FidelityLevel::named(if bent { "winkler" } else { REFERENCE }).unwrap_or(&LEVELS[0]);
+    let cells = on(scene.skin(), FINEST);
+    (level, if bent { cells } else { most_cells(scene.skin()).min(cells) })
+}
+
+/// Mean cost of a level over the scenes of a task in the shipped table, s for a simulated second, at its longest step.
+fn cost(task: &str, level: &str, cells_per_taxel: usize) -> f64 {
+    let rows = measured().iter().filter(|row| row.task == task && row.level == level);
+    let rows: Vec<_> = rows.filter(|row| row.cells_per_taxel == cells_per_taxel).collect();
+    let longest_s = rows.iter().map(|row| row.timestep_s).fold(0.0, f64::max);
+    let costs: Vec<f64> = rows.iter().filter(|row| row.timestep_s >= longest_s).map(|row| row.cost_s_per_s).collect();
+    costs.iter().sum::<f64>() / costs.len() as f64
+}
+
+/// Taxels' pressures of a level at the scene's force and at a light one.
+type Held = [Vec<f64>; 2];
+
+/// The larger relative difference of the two; infinite if there is none.
+fn difference(found: &Held, expected: &Held) -> f64 {
+    let relative = |k: usize| {
+        let off: f64 = found[k].iter().zip(&expected[k]).map(|(p, q)| (p - q).powi(2)).sum();
+        let relative = (off / expected[k].iter().map(|q| q * q).sum::<f64>()).sqrt();
+        if relative.is_nan() { f64::INFINITY } else { relative }
+    };
+    relative(0).max(LIGHT_WEIGHT * relative(1))
+}
+
+/// The contact of a scene on the part of the skin that is under the body.
+struct Trial<'a> {
+    scene: &'a Mechanics,
+    contact: &'a toml::Table,
+    skin: SkinLayout,
+    body: PosedMesh<'a>,
+    /// Force, N, and depth, m, of the scene and of a light touch.
+    held: [[f64; 2]; 2],
+    finest: usize,
+}
+
+impl<'a> Trial<'a> {
+    fn new(scene: &'a Mechanics, contact: &'a toml::Table) -> Result<Self, Refusal> {
+        let (body, _) = scene.contact_body();
+        let curve = scene.depth_curve();
+        let held = match scene.task() {
+            Task::Press(press) => {
+                [1.0, LIGHT].map(|share| [share * press.force_n, curve.depth_m(share * press.force_n)])
+            }
+            Task::Drop(_) => {
+                let deepest_m = curve.depth_m(f64::INFINITY);
+                [1.0, LIGHT].map(|share| [f64::NAN, share * deepest_m])
+            }
+        };
+        let whole = *scene.skin();
+        // the taxels that feel anything in the deeper pose, and those beside them
+        let mut field = scene.build_contact()?;
+        let cells = field.cells_per_taxel();
+        let answer = field.respond(&lowered(body, held[0][1]));
+        let patch = answer.patch.unwrap_or_default();
+        let taxels = |[first, end]: [usize; 2], count: usize| {
+            [(first / cells).saturating_sub(1), (end.div_ceil(cells) + 1).min(count)]
+        };
+        let [rows, cols] = [taxels(patch.rows, whole.rows()), taxels(patch.cols, whole.cols())];
+        let skin = SkinLayout::new(rows[1] - rows[0], cols[1] - cols[0], whole.pitch_m(), whole.electrode_m())?;
+        let middle = |[first, end]: [usize; 2]| 0.5 * (first + end - 1) as f64;
+        let [x, y] = whole.position_m(middle(rows), middle(cols));
+        let [body_x, body_y, z] = body.position_m;
+        let body = PosedMesh { position_m: [body_x - x, body_y - y, z], ..body };
+        let finest = most_cells(&skin).min(on(&skin, FINEST));
+        Ok(Self { scene, contact, skin, body, held, finest })
+    }
+
+    /// Whether a scene of this task can have the level.
+    fn takes(&self, level: &FidelityLevel) -> bool {
+        let press = matches!(self.scene.task(), Task::Press(_));
+        // never the best: a half-space has no base under it
+        level.name != "half_space" && (press || level.dynamic)
+    }
+
+    /// Most cells a taxel that the whole skin can have.
+    fn most_cells(&self, level: &FidelityLevel) -> usize {
+        if level.coupled.is_some() { most_cells(self.scene.skin()).min(self.finest) } else { MOST_CELLS }
+    }
+
+    /// What the taxels feel of the held poses.
+    fn pressures(&self, level: &FidelityLevel, cells_per_taxel: usize) -> Result<Held, Refusal> {
+        let mut contact = self.contact.clone();
+        level.apply(&mut contact, cells_per_taxel);
+        let press = matches!(self.scene.task(), Task::Press(_));
+        if press {
+            // under a prescribed force
+            let model = if level.coupled.is_some() { level.model } else { "footprint" };
+            change_model(&mut contact, model);
+            if level.coupled.is_some() {
+                contact.insert("coupled".to_owned(), false.into());
+            }
+        }
+        let model = contact.remove("model");
+        let model = model.as_ref().and_then(toml::Value::as_str).unwrap_or_default();
+        let mut field = build_contact(model, contact, &self.skin)?;
+        field.expect(self.scene.mesh());
+        let bins = TaxelBins::new(&self.skin, cells_per_taxel);
+        let mut held = Held::default();
+        for (out, [force_n, depth_m]) in held.iter_mut().zip(self.held) {
+            let body = lowered(self.body, depth_m);
+            let [x, y, _] = body.position_m;
+            let load = Load { force_n, axis_m: [x, y], holder: Holder::Rigid, from: None };
+            let [pressure, _] = if let Some(columns) = field.quasi_static() {
+                // a force that this level does not carry is an error like another
+                columns.carry(&body, &load).map_or_else(
+                    |_| [(); 2].map(|()| PressureMap::zeros(self.skin.rows(), self.skin.cols())),
+                    |balance| bins.means(balance.response.pressure_pa, balance.response.patch),
+                )
+            } else {
+                let answer = field.respond(&body);
+                let (answered_n, answered) = (answer.wrench.force_n[2], bins.means(answer.pressure_pa, answer.patch));
+                field
+                    .refine(&body, if press { force_n } else { answered_n })
+                    .map_or(answered, |fine| bins.means(fine, None))
+            };
+            *out = pressure.values().to_vec();
+        }
+        Ok(held)
+    }
+}
+
+/// `body` at a depth below the touch.
+fn lowered(body: PosedMesh<'_>, depth_m: f64) -> PosedMesh<'_> {
+    let [lowest_m, _] = body.heights_m();
+    let [x, y, _] = body.position_m;
+    PosedMesh { position_m: [x, y, -lowest_m - depth_m], ..body }
+}
+
+/// Cells along a taxel of `skin` that are no larger than so many of the usual one.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 1 and the most cells")]
+fn on(skin: &SkinLayout, cells: usize) -> usize {
+    let relative = (skin.pitch_m() / SkinLayout::default().pitch_m()).max(1.0);
+    (cells as f64 * relative - 1e-9).ceil().min(MOST_CELLS as f64) as usize
+}
+
+/// Most cells along a taxel of `skin` that an elastic field can have.
+#[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "between 0 and 2^10")]
+fn most_cells(skin: &SkinLayout) -> usize {
+    (MOST_SQUARES / skin.taxels() as f64).sqrt() as usize
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
-
-    fn row(scene: &str, level: &str, cells_per_taxel: usize, cost: f64, error: f64) -> MeasuredSetting {
-        MeasuredSetting {
-            scene: scene.to_owned(),
-            level: level.to_owned(),
-            cells_per_taxel,
-            timestep_s: 5e-4,
-            cost_s_per_s: cost,
-            taxel_rms_rel: error,
-            ..measured().iter().find(|row| row.task == "press").unwrap().clone()
-        }
-    }
 
     #[test]
     fn a_saved_scene_runs_on_any_level() {
@@ -217,25 +563,5 @@ mod tests {
         let mut contact: toml::Table = toml::from_str("stifness = 3").unwrap();
         change_model(&mut contact, "footprint");
         assert!(contact.contains_key("stifness"), "a mistake is not swallowed");
-    }
-
-    /// By hand: the cheap level is good on one scene only, the finer one on both, the reference costs most.
-    #[test]
-    fn the_cheapest_that_meets_it_on_every_scene() {
-        let table = [
-            row("T", "winkler", 2, 0.01, 0.01),
-            row("tape", "winkler", 2, 0.01, 0.30),
-            row("T", "winkler", 6, 0.02, 0.04),
-            row("tape", "winkler", 6, 0.04, 0.05),
-            row("T", "layer", 12, 1.0, 0.0),
-            row("tape", "layer", 12, 2.0, 0.0),
-            row("T", "layer", 6, 0.02, 0.0),
-        ];
-        let choice = |tolerance| cheapest(&table, "press", tolerance).map(|c| (c.level.name, c.cells_per_taxel));
-        assert_eq!(choice(0.5), Some(("winkler", 2)));
-        assert_eq!(choice(0.05), Some(("winkler", 6)));
-        assert_eq!(choice(0.01), Some(("layer", 12)), "the incomplete setting is not chosen");
-        assert_eq!(choice(f64::NAN), None);
-        assert_eq!(cheapest(&table, "drop", 0.5), None);
     }
 }

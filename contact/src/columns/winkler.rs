@@ -45,7 +45,7 @@ pub struct WinklerLayer {
     /// Initial compression of the columns, if there is any.
     pub(super) preload: Option<Preload>,
     /// x of the centres of a row's cells, m.
-    pub(super) x_m: Vec<f64>,
+    pub(crate) x_m: Vec<f64>,
     /// Friction along x and y on the cells of one row, Pa.
     friction_pa: [Vec<f64>; 2],
 }

@@ -1,6 +1,7 @@
 //! The elastic half-space and the bonded elastic layer as contact fields: their parameters, the problem that a body
 //! poses to the solver, and what its solution means.
 
+use super::forces::{Forces, Stand, step_n};
 use super::influence::{ElasticKernel, modulus_of_confined_pa};
 use super::solver::ElasticSolver;
 use crate::columns::WinklerLayer;
@@ -109,6 +110,9 @@ const JUMP: f64 = 1e-6;
 /// Shift of the body, m, and the force it carries there beyond the one wanted, N.
 type Trial = (f64, f64);
 
+/// An overlap of this or less is no contact, m: of a pose 0.1 m from its origin, the last bits are a thousandth of it.
+const GRAZE_M: f64 = 1e-14;
+
 /// First step of the search for a depth, in thicknesses, and most solutions it may take.
 const FIRST_STRIDE: f64 = 0.02;
 const MOST_TRIALS: usize = 60;
@@ -159,7 +163,7 @@ const ERROR_PER_TOLERANCE: f64 = 10.0;
 pub struct ElasticField {
     config: ElasticConfig,
     /// The layer used by the dynamics without `coupled`.
-    winkler: Option<WinklerLayer>,
+    columns: Option<Columns>,
     solver: ElasticSolver,
     envelope: Envelope,
     /// Rise of the surface beside a load in units of the depth.
@@ -175,6 +179,10 @@ pub struct ElasticField {
     shift_m: f64,
     /// Slope of the force there, N/m, once known.
     slope_n_per_m: Option<f64>,
+    /// Pressures under some forces, and a frame between two of them: the pressure, and where there is any.
+    forces: Forces,
+    frame_pa: Vec<f64>,
+    frame_patch: Patch,
     /// Why the last call had no answer.
     failure: Option<String>,
 }
@@ -201,10 +209,10 @@ impl ElasticField {
         let envelope = Envelope::new(skin, config.cells_per_taxel);
         let [rows, cols] = envelope.shape();
         let solver = ElasticSolver::new(kernel, [rows, cols], envelope.cell_m());
-        let winkler = (!config.coupled).then(|| WinklerLayer::new(config.foam(), skin));
+        let columns = (!config.coupled).then(|| Columns::new(config.foam(), skin, 1));
         Ok(Self {
             config,
-            winkler: winkler.transpose()?,
+            columns: columns.transpose()?,
             bulge: solver.bulge(),
             solver,
             patch: Patch::default(),
@@ -215,6 +223,9 @@ impl ElasticField {
             envelope,
             shift_m: 0.0,
             slope_n_per_m: None,
+            forces: Forces::default(),
+            frame_pa: Vec::new(),
+            frame_patch: Patch::default(),
             failure: None,
         })
     }
@@ -246,6 +257,41 @@ impl ElasticField {
         Some(&self.pressure_pa)
     }
 
+    /// Leaves the pressure of a frame of a slow press in `frame_pa`: between those under a smaller and a larger force.
+    /// `None` for a frame that stands for itself.
+    fn interpolate(&mut self, body: &PosedMesh<'_>, carried_n: f64) -> Option<()> {
+        if !self.envelope.knows(body.mesh) {
+            self.forces.forget();
+        }
+        let stand = Stand::new(body, self.envelope.cell_m(), self.config.damping_s);
+        let (steps, share) = self.forces.around(carried_n, stand)?;
+        let stand = stand?;
+        for step in steps {
+            if self.forces.get(step, &stand).is_none() {
+                let Some(reached_n) = self.balance(body, step_n(step)) else {
+                    (self.shift_m, self.slope_n_per_m) = (0.0, None);
+                    return None;
+                };
+                let scale = step_n(step) / reached_n;
+                let pressure_pa = self.patch_pa.iter().map(|p| scale * p).collect();
+                self.forces.insert(step, stand, self.patch, pressure_pa);
+            }
+        }
+        let width = self.envelope.shape()[1];
+        self.frame_pa.resize(self.pressure_pa.len(), 0.0);
+        self.frame_patch.lines(width).for_each(|line| self.frame_pa[line].fill(0.0));
+        self.frame_patch = Patch::default();
+        for (step, share) in steps.into_iter().zip([1.0 - share, share]) {
+            let known = self.forces.get(step, &stand)?;
+            self.frame_patch.include(known.patch);
+            let own = known.pressure_pa.chunks_exact(known.patch.width().max(1));
+            for (line, own) in known.patch.lines(width).zip(own) {
+                self.frame_pa[line].iter_mut().zip(own).for_each(|(p, own)| *p += share * own);
+            }
+        }
+        Some(())
+    }
+
     /// No answer, and why.
     fn fail<T>(&mut self, failure: String) -> Option<T> {
         self.lift();
@@ -270,11 +316,13 @@ impl ElasticField {
         let c = self.config;
         let margin_m = self.margin_m(body, shift_m);
         let [x, y, z] = body.position_m;
+        let [lowest_m, _] = body.heights_m();
         let lowered = PosedMesh { position_m: [x, y, z - shift_m - margin_m], ..*body };
         self.clear();
         let seen = self.envelope.rasterise(&lowered);
         self.patch = self.contact_patch(seen);
-        if self.patch == Patch::default() {
+        if self.patch == Patch::default() || shift_m - lowest_m - z <= GRAZE_M {
+            self.patch = Patch::default();
             self.patch_pa.clear();
             self.solver.forget();
             return Some(0.0);
@@ -447,22 +495,88 @@ fn deepest(parts: &[Part], cell_m: f64) -> (f64, f64) {
     (share.min(1.0), moment / share)
 }
 
+/// Columns for the dynamics. Under a body that is announced and wide their cells may be larger than those of the frames:
+/// a rim counts by what it covers of them.
+struct Columns {
+    skin: SkinLayout,
+    layer: WinklerLayer,
+    /// Cells of the elastic field along a cell of the columns; above 1, the pressure on those.
+    finer: usize,
+    spread_pa: Vec<f64>,
+    patch: Patch,
+}
+
+/// Least cells of the columns along one side of a taxel, and along the second of the three sides of a body.
+const COLUMN_CELLS: usize = 6;
+const BODY_CELLS: f64 = 10.0;
+
+impl Columns {
+    fn new(foam: Foam, skin: &SkinLayout, finer: usize) -> Result<Self, Refusal> {
+        let layer = WinklerLayer::new(Foam { cells_per_taxel: foam.cells_per_taxel / finer, ..foam }, skin)?;
+        let count = if finer > 1 { layer.pressure_pa.len() * finer * finer } else { 0 };
+        Ok(Self { skin: *skin, layer, finer, spread_pa: vec![0.0; count], patch: Patch::default() })
+    }
+
+    /// The columns for bodies of a mesh: on the largest cells that divide into those of the frames.
+    fn expect(&mut self, foam: Foam, mesh: &PreparedMesh) {
+        let (cells, pitch_m) = (foam.cells_per_taxel, self.skin.pitch_m());
+        let (low, high) = mesh.bounds().unwrap_or_default();
+        let mut sides = [0, 1, 2].map(|k| high[k] - low[k]);
+        sides.sort_by(f64::total_cmp);
+        // of a plate or a blade the smallest is its thickness
+        let wide = |own: &usize| *own as f64 * sides[1] >= BODY_CELLS * pitch_m;
+        let own = (COLUMN_CELLS..=cells).find(|own| cells % own == 0 && wide(own)).unwrap_or(cells);
+        if cells / own != self.finer
+            && let Ok(columns) = Self::new(foam, &self.skin, cells / own)
+        {
+            *self = columns;
+        }
+        self.layer.expect(mesh);
+    }
+
+    fn respond(&mut self, body: &PosedMesh<'_>) -> Wrench {
+        let wrench = self.layer.respond(body).wrench;
+        if self.finer > 1 {
+            let (finer, width) = (self.finer, self.layer.x_m.len());
+            self.patch.lines(finer * width).for_each(|line| self.spread_pa[line].fill(0.0));
+            let own = self.layer.patch;
+            self.patch = Patch { rows: own.rows.map(|i| i * finer), cols: own.cols.map(|i| i * finer) };
+            for (row, line) in (self.patch.rows[0]..).zip(self.patch.lines(finer * width)) {
+                let from = &self.layer.pressure_pa[row / finer * width..][own.cols[0]..own.cols[1]];
+                let cells = self.spread_pa[line].chunks_exact_mut(finer);
+                cells.zip(from).for_each(|(cells, p)| cells.fill(*p));
+            }
+        }
+        wrench
+    }
+
+    fn pressure_pa(&self) -> &[f64] {
+        if self.finer > 1 { &self.spread_pa } else { &self.layer.pressure_pa }
+    }
+}
+
 impl ContactField for ElasticField {
     fn expect(&mut self, mesh: &PreparedMesh) {
+        if !self.envelope.knows(mesh) {
+            self.forces.forget();
+        }
         self.envelope.expect(mesh);
-        if let Some(winkler) = &mut self.winkler {
-            winkler.expect(mesh);
+        if let Some(columns) = &mut self.columns {
+            columns.expect(self.config.foam(), mesh);
         }
     }
 
     fn respond(&mut self, body: &PosedMesh<'_>) -> Response<'_> {
-        let (wrench, patch) = match &mut self.winkler {
-            // a frame's pressure may reach further than the dynamics' own
-            Some(winkler) => (winkler.respond(body).wrench, None),
-            None => (self.elastic(body), Some(self.patch)),
+        let wrench = match &mut self.columns {
+            Some(columns) => columns.respond(body),
+            None => self.elastic(body),
         };
-        let winkler_pa = self.winkler.as_ref().map(|winkler| &winkler.pressure_pa);
-        Response { wrench, pressure_pa: winkler_pa.unwrap_or(&self.pressure_pa), patch }
+        let (pressure_pa, patch) = match &self.columns {
+            // a frame's pressure may reach further than the dynamics' own
+            Some(columns) => (columns.pressure_pa(), None),
+            None => (&self.pressure_pa[..], Some(self.patch)),
+        };
+        Response { wrench, pressure_pa, patch }
     }
 
     fn failure(&self) -> Option<String> {
@@ -470,8 +584,12 @@ impl ContactField for ElasticField {
     }
 
     fn refine(&mut self, body: &PosedMesh<'_>, force_n: f64) -> Option<&[f64]> {
-        self.winkler.as_ref()?;
-        self.carry(body, force_n)
+        self.columns.as_ref()?;
+        self.failure = None;
+        match self.interpolate(body, force_n) {
+            Some(()) => Some(&self.frame_pa),
+            None => self.carry(body, force_n),
+        }
     }
 
     fn tolerance(&self) -> f64 {

@@ -4,7 +4,8 @@ use super::{ElasticConfig, ElasticField, ElasticKernel, ElasticSolver, Influence
 use crate::columns::WinklerLayer;
 use crate::foam::FoamLaw;
 use crate::mesh::{TriMesh, cuboid, sphere};
-use crate::{ContactField as _, Patch, PosedMesh, build_contact};
+use crate::objects::OBJECTS;
+use crate::{ContactField as _, Patch, PosedMesh, TaxelBins, build_contact};
 use approx::assert_relative_eq;
 use spts_models::SkinLayout;
 
@@ -122,6 +123,61 @@ fn refuses_what_it_cannot_do() {
     let wide = SkinLayout::new(1000, 1000, 1e-3, 5e-4).unwrap();
     let error = ElasticField::new(ElasticConfig::default(), true, &wide).err().unwrap();
     assert!(error.to_string().contains("2^20"), "{error}");
+}
+
+/// A press that comes down slowly and goes up again: in every frame the taxels feel what they feel in it by itself, within
+/// the 0.1 % of the middle of a ball (`forces::RATIO`), and four times as much for the rim of a contact that grows cell
+/// by cell; its force is exact. A frame that moves, is moved aside or is of another surface stands for itself, bit for bit but for
+/// where the iteration starts.
+#[test]
+fn frames_between_two_forces() {
+    let config = ElasticConfig { coupled: false, ..ElasticConfig::default() };
+    let (ball, plate) = (sphere(33.4e-3, 24, 48), plate([-0.03, 0.03], [-0.015, 0.015]));
+    let bins = TaxelBins::new(&SkinLayout::default(), config.cells_per_taxel);
+    let mut layer = field(config, true);
+    for mesh in [&ball, &plate] {
+        for k in (8..60).chain((8..60).rev()) {
+            let mut body = PosedMesh::at_rest(mesh, [0.003, -0.002, -5e-5 * f64::from(k)]);
+            match k % 17 {
+                5 => body.position_m[0] += 0.01,
+                6 => body.stiffness_pa_per_m = 1e6,
+                7 => body.velocity_m_per_s[2] = 1.0,
+                _ => {}
+            }
+            let force_n = layer.respond(&PosedMesh { velocity_m_per_s: [0.0; 3], ..body }).wrench.force_n[2];
+            let found = layer.refine(&body, force_n).unwrap().to_vec();
+            let mut alone = field(config, true);
+            let expected = alone.refine(&body, force_n).unwrap();
+            let norm = |values: &mut dyn Iterator<Item = f64>| values.map(|v| v * v).sum::<f64>().sqrt();
+            let [taxels, expected] = [&found, expected].map(|fine| bins.means(fine, None)[0].values().to_vec());
+            let off = norm(&mut taxels.iter().zip(&expected).map(|(a, b)| a - b));
+            let all = norm(&mut expected.iter().copied());
+            let most = if (5..8).contains(&(k % 17)) { 1e-4 } else { 4e-3 };
+            assert!(off < most * all, "{k}: {}", off / all);
+            let sum: f64 = found.iter().sum::<f64>() * (0.015_f64 / 6.0).powi(2);
+            assert_relative_eq!(sum, force_n, max_relative = 1e-12);
+        }
+    }
+}
+
+/// A body that grazes the skin, to the last bits of its height, has an answer: on the way down and from a deep pose.
+#[test]
+fn a_graze_has_an_answer() {
+    let mut layer = field(ElasticConfig { cells_per_taxel: 3, ..ElasticConfig::default() }, true);
+    for object in OBJECTS {
+        let mesh = (object.build)();
+        let body = PosedMesh { rotation: object.placement.matrix(), ..PosedMesh::at_rest(&mesh, [0.0; 3]) };
+        let at = |z: f64| PosedMesh { position_m: [0.0, 0.0, z], ..body };
+        let [low_m, _] = body.heights_m();
+        let (mut apart, mut deep) = (-low_m, -low_m - 2e-3);
+        for _ in 0..60 {
+            let middle = 0.5 * (apart + deep);
+            let force_n = layer.respond(&at(middle)).wrench.force_n[2];
+            assert!(force_n >= 0.0, "{}: {force_n}", object.name);
+            *if force_n > 0.0 { &mut deep } else { &mut apart } = middle;
+        }
+        assert!(layer.respond(&at(deep)).wrench.force_n[2] > 0.0, "{}", object.name);
+    }
 }
 
 /// Nothing lies under the body: no depth gives the force, and the field says so until it has an answer again.

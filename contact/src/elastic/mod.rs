@@ -7,6 +7,7 @@ mod convolution;
 mod field;
 #[cfg(test)]
 mod field_tests;
+mod forces;
 mod influence;
 mod pcg;
 mod solver;

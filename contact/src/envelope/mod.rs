@@ -196,6 +196,11 @@ impl Envelope {
         }
     }
 
+    /// Whether `mesh` is that of the present body.
+    pub(crate) fn knows(&self, mesh: &TriMesh) -> bool {
+        self.known.blocks.is_of(mesh)
+    }
+
     /// Exchanges what is known of the present body.
     pub(crate) fn swap_known(&mut self, known: &mut KnownBody) {
         std::mem::swap(&mut self.known, known);

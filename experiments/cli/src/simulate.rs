@@ -1,12 +1,12 @@
 //! `spts simulate`: one scene, from its name to its result files.
 
-use crate::context::{Common, TICK, note, notes, open_folder, progress, spinner};
+use crate::context::{Bars, Common, TICK, note, notes, open_folder, progress, spinner};
 use crate::error::CliError;
 use crate::options::{number, seed, whole};
 use clap::Args;
 use serde::Serialize;
 use spts::Session;
-use spts::scene::{Assignment, MESH_COPY, Timestep};
+use spts::scene::{Assignment, MESH_COPY, Timestep, Tolerance};
 use spts::simulate::{Prepared, Request, Summary, run};
 use spts_contact::Frame;
 use spts_contact::mesh::MAX_FILE_BYTES;
@@ -18,6 +18,7 @@ use spts_eval::training::TrainingData;
 use spts_models::{SkinLayout, Streams};
 use spts_report::animation::Animation;
 use spts_report::simulation::SimulationFiles;
+use spts_studies::fidelity::ToleranceCheck;
 use std::path::{Path, PathBuf};
 use toml::Value;
 
@@ -38,6 +39,7 @@ use toml::Value;
   spts simulate bounce --animate
   spts simulate arm --set bend.radius_m=0.04 --set bend.strain=0.02
   spts simulate press/T --tolerance 0.05
+  spts simulate press/T --tolerance iou=0.02 --check
   spts simulate press/comb --contact layer --cells 12 --timestep auto
   spts simulate press/T --fault dead:44 --fault skipping_clocks:12
   spts simulate press/T --weights firmware
@@ -114,11 +116,16 @@ pub(super) struct SimulateCommand {
     /// Resolution of the contact: grid squares along one side of a taxel; [1, 64] [default: 6, or the scene file's]
     #[arg(long, value_name = "N", value_parser = whole::<u32>(1..=64))]
     cells: Option<u32>,
-    /// Largest relative error of the taxels' pressures, [0.03, 1]. The twin takes the cheapest contact model, grid and
-    /// time step whose error, as `spts fidelity` has measured it, is no larger [default: none; --contact, --cells and
-    /// --timestep choose them]
-    #[arg(long, value_name = "E", conflicts_with_all = ["contact", "cells", "timestep"], value_parser = number)]
-    tolerance: Option<f64>,
+    /// The error that the scene may have against the finest contact: E, the relative error of the taxels' pressures,
+    /// [0.03, 1]; or iou=E or class=E, the change of that score, [0.005, 0.5]. The twin takes the cheapest contact model
+    /// and grid that keep to it on this scene's contact, and the longest stable step [default: none; --contact, --cells
+    /// and --timestep choose them]
+    #[arg(long, value_name = "E", conflicts_with_all = ["contact", "cells", "timestep"])]
+    tolerance: Option<Tolerance>,
+    /// Runs the full chain beside the one that a tolerance chose, on the first two presses or drops of this scene, and
+    /// prints the differences
+    #[arg(long)]
+    check: bool,
     /// Root of every random number; [0, 2^63) [default: 0, or the scene file's]
     #[arg(long, value_parser = seed)]
     seed: Option<u64>,
@@ -208,7 +215,7 @@ impl SimulateCommand {
             ("--force", &["press.force_n"], number(self.force)),
             ("--height", &["drop.height_m"], number(self.height)),
             ("--presses", &["press.presses", "drop.drops"], self.presses.map(Value::from)),
-            ("--tolerance", &["tolerance"], number(self.tolerance)),
+            ("--tolerance", &["tolerance"], self.tolerance.map(Tolerance::to_toml)),
             ("--timestep", &["timestep_s"], self.timestep.map(|step| step.to_toml())),
             ("--contact", &["contact.model"], text(&self.contact)),
             ("--cells", &["contact.cells_per_taxel"], self.cells.map(Value::from)),
@@ -239,6 +246,9 @@ impl SimulateCommand {
         self.common.start()?;
         let request = Request { scene: self.scene.clone().unwrap_or_default(), assignments: self.assignments()? };
         let prepared = request.prepare()?;
+        if self.check && prepared.scene.config().chosen_for_tolerance.is_none() {
+            return Err(CliError::usage("--check needs a scene with a tolerance, as with --tolerance 0.05"));
+        }
         let out = self.out.clone();
         let out = out.unwrap_or_else(|| default_folder(&prepared));
         let folder = open_folder(&out)?;
@@ -288,9 +298,20 @@ impl SimulateCommand {
         }
         let names = files.finish(&simulation, &summary, self.render, decoded)?;
         drop(writing);
-        let text = || format!("{}\n{}: {}", summary.table(), out.display(), names.join(", "));
-        self.common.print(&summary, text)
+        let check = self.check.then(|| ToleranceCheck::run(&out.join("scene.toml"), &Bars::default())).transpose()?;
+        let checked = check.as_ref().map(spts_report::fidelity::check_text).unwrap_or_default();
+        let text = || format!("{}\n{}: {}{checked}", summary.table(), out.display(), names.join(", "));
+        self.common.print(&Printed { summary: &summary, check: check.as_ref() }, text)
     }
+}
+
+/// What `--json` prints.
+#[derive(Serialize)]
+struct Printed<'a> {
+    #[serde(flatten)]
+    summary: &'a Summary,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    check: Option<&'a ToleranceCheck>,
 }
 
 /// What is to be said of a session in which a scan of all taxels takes longer than the object is held.

@@ -7,7 +7,8 @@ use spts::output::{OutputFolder, write_bytes, write_json, write_table};
 use spts_eval::{Table, unique};
 use spts_input::Refusal;
 use spts_sim::fidelity::{FidelityLevel, LEVELS, MeasuredSetting};
-use spts_studies::fidelity::{FidelityReport, FinePressure};
+use spts_studies::fidelity::{FidelityReport, FinePressure, ToleranceCheck};
+use spts_studies::tolerances::{ToleranceReport, ToleranceRow};
 
 /// Writes the tables, their summary, the figures and the provenance of `report` beside the scenes that wait in `out`.
 ///
@@ -77,6 +78,100 @@ pub fn text(report: &FidelityReport) -> String {
         out.push_str(&format!("{} settings were refused (refused.csv)\n", report.refusals.len()));
     }
     out
+}
+
+/// Writes the rows of a study of tolerances, their summary and their provenance.
+///
+/// # Errors
+/// [`Refusal`] when a file cannot be written.
+pub fn write_tolerances(report: &ToleranceReport, out: OutputFolder) -> Result<(), Refusal> {
+    write_all_or_none(out, |out| {
+        write_table(&out.path("tolerances.csv"), &report.rows)?;
+        write_bytes(&out.path("summary.md"), tolerances_text(report).as_bytes())?;
+        write_json(&out.path("provenance.json"), &Origin::here(report.provenance.clone()))
+    })
+}
+
+/// What became of each tolerance, with the scenes that missed it.
+pub fn tolerances_text(report: &ToleranceReport) -> String {
+    let mut rows: Vec<&ToleranceRow> = report.rows.iter().collect();
+    rows.sort_by(|a, b| a.tolerance.total_cmp(&b.tolerance));
+    let asked: Vec<&[&ToleranceRow]> = rows.chunk_by(|a, b| a.tolerance.to_bits() == b.tolerance.to_bits()).collect();
+    let sum = |rows: &[&ToleranceRow], get: fn(&ToleranceRow) -> f64| rows.iter().map(|r| get(r)).sum::<f64>();
+    let most = |rows: &[&ToleranceRow], get: fn(&ToleranceRow) -> f64| rows.iter().map(|r| get(r)).fold(0.0, f64::max);
+    // not a number is not kept
+    let kept = |row: &ToleranceRow| row.error <= row.tolerance;
+    let table = Table::new("tolerances", &asked)
+        .shown("asked", |rows| rows[0].tolerance)
+        .shown("scenes", |rows| rows.len())
+        .shown("kept", |rows| rows.iter().filter(|r| kept(r)).count())
+        .shown("worst error / asked", |rows| most(rows, |r| r.error / r.tolerance))
+        .digits(2)
+        .shown("mean error", |rows| sum(rows, |r| r.error) / rows.len() as f64)
+        .digits(3)
+        .shown("finest not converged", |rows| rows.iter().filter(|r| r.finest_error > r.tolerance).count())
+        .shown("finest takes, times", |rows| {
+            let timed = rows.iter().filter_map(|r| Some([r.finest_cost_s?, r.cost_s]));
+            let [finest_s, own_s] = timed.fold([0.0; 2], |sum, r| [sum[0] + r[0], sum[1] + r[1]]);
+            finest_s / own_s
+        })
+        .digits(1);
+    let mut out = format!(
+        "Errors of the taxels' pressures against the finest level, and where halving its cells moved it by more than was \
+         asked\n\n{}\n",
+        table.text()
+    );
+    for row in rows.iter().filter(|r| !kept(r)) {
+        out.push_str(&format!(
+            "{} asked: {:.4} for {} of {} N, foam of {} m and {:e} Pa/m, pitch of {} m ({}, {} cells; expected {:.4})\n",
+            row.tolerance,
+            row.error,
+            row.object,
+            row.force_n,
+            row.thickness_m,
+            row.stiffness_pa_per_m,
+            row.pitch_m,
+            row.contact,
+            row.cells_per_taxel,
+            row.expected
+        ));
+    }
+    if !report.refused.is_empty() {
+        out.push_str(&format!(
+            "{} scenes cannot be, such as: {}\n",
+            report.refused.len(),
+            report.refused[0].join(": ")
+        ));
+    }
+    out
+}
+
+/// The check of a tolerance as a table, and whether it is met.
+pub fn check_text(check: &ToleranceCheck) -> String {
+    let rows = [("chosen", &check.chosen), ("full", &check.full)];
+    let table = Table::new("check", &rows[..])
+        .shown("chain", |(name, _)| *name)
+        .shown("contact", |(_, c)| &c.contact)
+        .shown("cells", |(_, c)| c.cells_per_taxel)
+        .shown("step", |(_, c)| c.timestep_s)
+        .unit("ms", 1e3)
+        .shown("support", |(_, c)| c.support)
+        .digits(3)
+        .shown("IoU", |(_, c)| c.iou)
+        .digits(3)
+        .shown("class", |(_, c)| c.class)
+        .digits(3)
+        .shown("contact, s", |(_, c)| c.contact_s)
+        .digits(2)
+        .shown("readout and decoding, s", |(_, c)| c.readout_s)
+        .digits(2);
+    let ToleranceCheck { tolerance, difference, pressure_error, saves, .. } = check;
+    let met = if check.met { "met" } else { "NOT met" };
+    format!(
+        "\n\n{}\ntolerance of {tolerance}: {met}, the difference is {difference:.4}; the taxels' pressures differ by \
+         {pressure_error:.4}, and the full chain took {saves:.1} times as long",
+        table.text()
+    )
 }
 
 /// One contact model, resolution and time step on all scenes of one kind, presses or drops: at least one.

@@ -9,7 +9,7 @@ use spts::chain::Acquisition;
 use spts::output::write_bytes;
 use spts::progress::Progress;
 use spts::provenance::{Provenance, combined_hash};
-use spts::scene::{DropConfig, PressConfig, Scene, SceneConfig, Task};
+use spts::scene::{DropConfig, PressConfig, Scene, SceneConfig, Task, Timestep, Tolerance};
 use spts_circuit::Mode;
 use spts_contact::Frame;
 use spts_contact::mesh::{TriMesh, cylinder, extrude, sphere};
@@ -23,7 +23,7 @@ use spts_recon::classify::Library;
 use spts_recon::dictionary::{Ksvd, Selection, select};
 use spts_recon::metrics::{SUPPORT_THRESHOLD, support};
 use spts_sim::World;
-use spts_sim::fidelity::{FidelityLevel, LEVELS, MeasuredSetting, REFERENCE};
+use spts_sim::fidelity::{FidelityLevel, LEVELS, MeasuredSetting, REFERENCE, finest};
 use spts_sim::world::{Bounce, no_pressure};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
@@ -429,7 +429,7 @@ pub struct FinePressure {
 
 /// What one run gave.
 #[derive(Debug, Clone)]
-struct ContactRun {
+pub(crate) struct ContactRun {
     frames: Vec<Frame>,
     bounces: Vec<Bounce>,
     fine: FinePressure,
@@ -447,7 +447,7 @@ const ENOUGH_S: f64 = 0.3;
 
 /// Runs press or drop `index` of `scene`. The cost is that of the quickest of at most `most_runs` runs, set-up
 /// included; long runs are made once.
-fn run_contact(scene: &Scene, index: usize, most_runs: usize) -> Result<ContactRun, Refusal> {
+pub(crate) fn run_contact(scene: &Scene, index: usize, most_runs: usize) -> Result<ContactRun, Refusal> {
     let (mut least_s, mut spent_s) = (f64::INFINITY, 0.0);
     let mut last = None;
     for _ in 0..most_runs {
@@ -540,7 +540,7 @@ const DROP_SAMPLE_S: f64 = 5e-5;
 
 /// Error of the taxels' pressures, over all frames of a press, or over the first contact of a drop, both counted from
 /// when the force first passes half its peak: what a step's delay adds to the flight is no error of the contact.
-fn taxel_error(found: &ContactRun, reference: &ContactRun) -> f64 {
+pub(crate) fn taxel_error(found: &ContactRun, reference: &ContactRun) -> f64 {
     // times in the reference and in the run
     let times_s: Vec<(f64, f64)> = match reference.bounces.first() {
         None => reference.frames.iter().map(|frame| (frame.time_s, frame.time_s)).collect(),
@@ -586,8 +586,8 @@ fn pressure_at(frames: &[Frame], time_s: f64) -> Vec<f64> {
     }
 }
 
-/// Measurements of a window.
-const M: usize = 20;
+/// Taxels for one measurement of a window: 20 measurements on 100 taxels.
+const TAXELS_PER_MEASUREMENT: usize = 5;
 /// Most windows scored of one recording, spread evenly over the span.
 const WINDOWS: usize = 300;
 /// Library images of a scene.
@@ -675,13 +675,17 @@ impl ReferenceScores {
         let quiet = index(IDLE * first_s.map_or(scene.duration_s(), |f| f.time_s));
         let idle = volts[..quiet].iter().sum::<f64>() / quiet.max(1) as f64;
         let press = Press::within(&recording, 0, start..end, idle);
-        let stride = (press.len() / WINDOWS).max(M);
-        let (starts, windows): (Vec<usize>, Vec<Window<'_>>) = press.windows(0..press.len(), M, stride).unzip();
+        // at least 20 windows
+        let most = (press.len() / 20).max(1);
+        let measurements = (scene.skin().taxels() / TAXELS_PER_MEASUREMENT).clamp(1, most);
+        let stride = (press.len() / WINDOWS).max(measurements);
+        let windows = press.windows(0..press.len(), measurements, stride);
+        let (starts, windows): (Vec<usize>, Vec<Window<'_>>) = windows.unzip();
         let mut scorer = Scorer::new(&self.decoder);
         let answers = scorer.answers(&windows)?;
         let mut tally = Tally::default();
         for (window, answer) in starts.iter().zip(&answers) {
-            let time_s = (start + window + M / 2) as f64 / rate_hz;
+            let time_s = (start + window + measurements / 2) as f64 / rate_hz;
             if let Some(expected) = truth.mask(time_s) {
                 tally.image(&answer.image, expected);
             }
@@ -728,6 +732,119 @@ fn images(scene: &Scene, run: &ContactRun) -> Images {
 
 fn peak(image: &[f64]) -> f64 {
     image.iter().copied().fold(0.0, f64::max)
+}
+
+// The check of a tolerance: the full chain beside the one that it chose.
+
+/// A contact, the scores after the whole chain, and what it took.
+#[derive(Debug, Clone, Serialize)]
+pub struct CheckedChain {
+    /// Contact model.
+    pub contact: String,
+    /// Grid squares along one side of a taxel.
+    pub cells_per_taxel: usize,
+    /// Step of the dynamics, s.
+    pub timestep_s: f64,
+    /// Support accuracy, against the full chain's truth.
+    pub support: f64,
+    /// Intersection over union of the support, against the full chain's truth.
+    pub iou: f64,
+    /// Share of windows that are classified correctly.
+    pub class: f64,
+    /// Wall time of one press or drop, s.
+    pub contact_s: f64,
+    /// Wall time of its recording and decoding, s.
+    pub readout_s: f64,
+}
+
+/// A scene whose contact a tolerance chose, beside the same scene with the full chain.
+#[derive(Debug, Clone, Serialize)]
+pub struct ToleranceCheck {
+    /// What was asked for.
+    pub tolerance: Tolerance,
+    /// The chain of the scene.
+    pub chosen: CheckedChain,
+    /// The chain with the finest contact.
+    pub full: CheckedChain,
+    /// Error of the taxels' pressures over a press, or over the first contact of a drop.
+    pub pressure_error: f64,
+    /// The difference in what the tolerance is about.
+    pub difference: f64,
+    /// Whether it is within the tolerance.
+    pub met: bool,
+    /// Times that the full chain took as long.
+    pub saves: f64,
+}
+
+impl ToleranceCheck {
+    /// Runs the scene in the file `scene`, which was saved with a choice, with that and with the full chain. Decoders
+    /// learn from its first press or drop with the full chain, and from other objects; the second one is scored.
+    ///
+    /// # Errors
+    /// [`Refusal`] if the scene has no choice, or either chain cannot be run.
+    pub fn run(scene: &Path, progress: &dyn Progress) -> Result<Self, Refusal> {
+        progress.stage("the full chain beside it", Some(4));
+        let own = from_file(scene)?;
+        let chosen = Scene::new(own.config.clone(), &own.folder)?;
+        let Some(tolerance) = chosen.config().chosen_for_tolerance else {
+            return Err(Refusal::new("no tolerance chose the contact of this scene: nothing was left out"));
+        };
+        let (level, cells_per_taxel) = finest(chosen.mechanics());
+        let usual_s: f64 = if own.is_drop() { 1e-4 } else { 5e-4 };
+        // on stiff contacts the longest stable step is shorter than the usual one
+        let at = |timestep_s: Timestep| {
+            let mut config = own.config.clone();
+            level.apply(&mut config.contact, cells_per_taxel);
+            config.timestep_s = Some(timestep_s);
+            Scene::new(config, &own.folder)
+        };
+        let full = at(Timestep::Seconds(usual_s)).or_else(|_| at(Timestep::Auto))?;
+        let run = |scene: &Scene, index| {
+            let found = run_contact(scene, index, ONCE);
+            progress.step();
+            found
+        };
+        let reference = Reference { learned: run(&full, 0)?, scored: run(&full, 1)?, at_reference: full, scene: own };
+        let found = run(&chosen, 1)?;
+        let pressure_error = taxel_error(&found, &reference.scored);
+        let references = [reference];
+        let [reference] = &references;
+        let seed = chosen.seed();
+        // objects that need no file
+        let others = ["T", "tape", "comb"].into_iter().filter(|name| *name != chosen.object()).filter_map(|name| {
+            let config = SceneConfig { skin: *chosen.skin(), ..built_in(name, seed, Path::new("")).ok()?.config };
+            let scene = Scene::new(config, Path::new("")).ok()?;
+            let run = run_contact(&scene, 0, ONCE).ok()?;
+            Some((scene, run))
+        });
+        let learned = ReferenceScores::learn(&references, &others.collect::<Vec<_>>(), seed)?;
+        progress.step();
+        let chain = |scene: &Scene, run: &ContactRun| {
+            let start = Instant::now();
+            let [support, iou, class] = learned.score(scene, run, 0)?;
+            let mechanics = scene.mechanics();
+            let contact = mechanics.config().contact.get("model").and_then(toml::Value::as_str).unwrap_or_default();
+            Ok::<_, Refusal>(CheckedChain {
+                contact: contact.to_owned(),
+                cells_per_taxel: mechanics.build_contact()?.cells_per_taxel(),
+                timestep_s: mechanics.timestep_s(),
+                support,
+                iou,
+                class,
+                contact_s: run.cost_s_per_s * scene.duration_s(),
+                readout_s: start.elapsed().as_secs_f64(),
+            })
+        };
+        let (chosen, full) = (chain(&chosen, &found)?, chain(&reference.at_reference, &reference.scored)?);
+        progress.end();
+        let (difference, most) = match tolerance {
+            Tolerance::Pressure(most) => (pressure_error, most),
+            Tolerance::Iou(most) => ((chosen.iou - full.iou).abs(), most),
+            Tolerance::Class(most) => ((chosen.class - full.class).abs(), most),
+        };
+        let saves = (full.contact_s + full.readout_s) / (chosen.contact_s + chosen.readout_s);
+        Ok(Self { tolerance, chosen, full, pressure_error, difference, met: difference <= most, saves })
+    }
 }
 
 /// Results of `spts fidelity`: cost and error of every setting of every scene.

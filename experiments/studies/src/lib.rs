@@ -14,5 +14,6 @@ pub mod frames;
 pub mod per_object;
 pub mod readouts;
 pub mod sensing;
+pub mod tolerances;
 pub mod touches;
 mod wiring;

@@ -3,12 +3,12 @@
 use super::bend::BendConfig;
 use super::press::{DropConfig, PressConfig};
 use super::timestep::{LONGEST_STEP_S, SHORTEST_STEP_S, StepLimit, Timestep, impact_damping};
-use crate::fidelity::{FidelityChoice, cheapest, measured};
+use crate::fidelity::{FidelityChoice, FidelityLevel, Tolerance, change_model, choose};
 use serde::{Deserialize, Serialize};
 use spts_contact::mesh::{MeshReport, TriMesh, sphere};
 use spts_contact::{ContactField, DepthCurve, EquilibriumError, Pose, PosedMesh, PreparedMesh, build_contact};
 use spts_input::Refusal;
-use spts_models::{SkinLayout, in_interval, in_range, parsed_text};
+use spts_models::{SkinLayout, in_range, parsed_text};
 use std::path::Path;
 use std::sync::Arc;
 
@@ -21,13 +21,15 @@ pub struct MechanicsConfig {
     /// Time step of the dynamics, s; from 1e-6 to the stable limit, which is at most 2e-3. `"auto"` is the longest
     /// stable step that divides `frame_interval_s`. Default 0.5 ms for a press, 0.1 ms for a drop.
     pub timestep_s: Option<Timestep>,
-    /// Largest acceptable relative error of the taxels' pressures; [0.03, 1]. It replaces `contact.model`,
-    /// `contact.cells_per_taxel` and `timestep_s`: the scene uses the cheapest level of the shipped table that meets
-    /// the tolerance ([`crate::fidelity`]).
-    pub tolerance: Option<f64>,
-    /// The tolerance for which `contact.model`, `contact.cells_per_taxel` and `timestep_s` were chosen; (0, 1]. A scene
-    /// with a `tolerance` stores it here when it is saved, together with the chosen values. It changes no result.
-    pub chosen_for_tolerance: Option<f64>,
+    /// The error that the scene may have. It replaces `contact.model`, `contact.cells_per_taxel` and `timestep_s`: the
+    /// scene uses the cheapest level that meets the tolerance on its own contact ([`crate::fidelity`]).
+    pub tolerance: Option<Tolerance>,
+    /// The tolerance for which `contact.model`, `contact.cells_per_taxel` and `timestep_s` were chosen. A scene with a
+    /// `tolerance` stores it here when it is saved, together with the chosen values. It changes no result.
+    pub chosen_for_tolerance: Option<Tolerance>,
+    /// What was expected of that choice: the relative error of the taxels' pressures, how far the finest level may
+    /// itself be off, and how many times longer that takes. It changes no result.
+    pub chosen: Option<Expected>,
     /// Time between frames, s; [`timestep_s`, 0.1]. Default 2 ms for a press. A drop uses it while the ball is near the
     /// skin (default one time step, 0.1 ms with `timestep_s = "auto"`; at most 0.2 ms), and 2 ms otherwise.
     pub frame_interval_s: Option<f64>,
@@ -55,62 +57,58 @@ impl MechanicsConfig {
     }
 }
 
-// `tolerance`: a scene states the acceptable error, and uses the cheapest fidelity level that meets it.
+/// What was expected of the choice for a tolerance.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct Expected {
+    /// Relative root mean square error of the taxels' pressures against the finest level.
+    pub error: f64,
+    /// How far the pressures of the finest level moved when its cells were halved, in the same measure.
+    pub finest_error: f64,
+    /// Times that the finest level takes as long, by the means of the shipped table.
+    pub saves: f64,
+}
 
 /// What a tolerance chooses; a scene that has one must not say it too.
 const CHOSEN: [&str; 3] = ["model", "cells_per_taxel", "coupled"];
 
 impl MechanicsConfig {
-    /// Replaces `tolerance`, when there is one, by the fidelity level, resolution and time step that the shipped table
-    /// chooses for it. The study's cells are those of the default skin: a larger pitch gets as many more. What is
-    /// returned has no `tolerance`, so that it stays the same scene when the table is measured anew.
-    pub(super) fn with_level_chosen(mut self) -> Result<(Self, Option<FidelityChoice>), Refusal> {
-        if let Some(chosen) = self.chosen_for_tolerance {
-            in_interval("chosen_for_tolerance", chosen, "(0, 1]")?;
-        }
-        let Some(tolerance) = self.tolerance.take() else {
-            return Ok((self, None));
+    /// Replaces `tolerance`, when there is one, by the cheapest fidelity level that meets it on this scene's contact.
+    /// What is returned has no `tolerance`, so that it stays the same scene when the choice is made otherwise; whether
+    /// there was one.
+    fn with_level_chosen(mut self, folder: &Path, given: Option<&PreparedMesh>) -> Result<(Self, bool), Refusal> {
+        self.chosen_for_tolerance.map(|t| t.checked("chosen_for_tolerance")).transpose()?;
+        let Some(tolerance) = self.tolerance.take().map(|t| t.checked("tolerance")).transpose()? else {
+            return Ok((self, false));
         };
-        // what taxels feel on the reference itself changed by 3 % when its cells were halved, from 120 to 240 along the
-        // skin
-        in_interval("tolerance", tolerance, "[0.03, 1]")?;
         if let Some(key) = CHOSEN.iter().find(|key| self.contact.contains_key(**key)) {
             return Err(chosen_twice(&format!("contact.{key}")));
         }
         if self.timestep_s.is_some() {
             return Err(chosen_twice("timestep_s"));
         }
-        let task = if self.drop.is_some() { "drop" } else { "press" };
-        let pitch_m = self.skin.pitch_m();
-        let choice = cheapest(measured(), task, tolerance);
-        let cells = choice.and_then(|c| cells(c.cells_per_taxel, pitch_m / SkinLayout::default().pitch_m()));
-        let (Some(choice), Some(cells)) = (choice, cells) else {
-            return Err(Refusal::new(format!(
-                "`tolerance` = {tolerance}: no fidelity level of the shipped table meets it for a {task} on a skin of {pitch_m} \
-                 m pitch"
-            )));
+        let mut columns = self.clone();
+        change_model(&mut columns.contact, "winkler");
+        columns.timestep_s = Some(Timestep::Auto);
+        let scene = Mechanics::build(columns, folder, given.cloned())?;
+        // an elastic field may have no answer somewhere
+        let can_have = |level: &FidelityLevel, cells: usize| {
+            let mut config = Self { timestep_s: Some(Timestep::Auto), ..self.clone() };
+            level.apply(&mut config.contact, cells);
+            level.coupled.is_none() || Mechanics::build(config, folder, given.cloned()).is_ok()
         };
-        choice.level.apply(&mut self.contact, cells);
-        self.timestep_s = Some(choice.timestep_s.into());
+        let choice = choose(&scene, &self.contact, tolerance, can_have)?;
+        choice.level.apply(&mut self.contact, choice.cells_per_taxel);
         self.chosen_for_tolerance = Some(tolerance);
-        Ok((self, Some(choice)))
+        let FidelityChoice { error, finest_error, saves, .. } = choice;
+        self.chosen = Some(Expected { error, finest_error, saves });
+        Ok((self, true))
     }
 }
 
 /// The error of a tolerance together with one of the values that it determines.
 fn chosen_twice(key: &str) -> Refusal {
     Refusal::new(format!("`tolerance` chooses contact model, cells and time step; leave out `{key}`, or the tolerance"))
-}
-
-/// Most cells along one side of a taxel.
-const MOST_CELLS: f64 = 64.0;
-
-/// Cells that are no larger than those of the study on a skin whose pitch is `relative` times as large; `None` when a
-/// taxel cannot have so many.
-#[expect(clippy::cast_possible_truncation, reason = "between 1 and the most cells")]
-fn cells(measured: usize, relative: f64) -> Option<usize> {
-    let cells = (measured as f64 * relative - 1e-9).ceil().max(1.0);
-    (cells <= MOST_CELLS).then_some(cells as usize)
 }
 
 /// Smallest mass that moves with an object on the flange, kg: the effective mass of the arm's rotors (1 and 0.2 kg m²
@@ -174,7 +172,7 @@ impl Mechanics {
     }
 
     fn build(config: MechanicsConfig, folder: &Path, given: Option<PreparedMesh>) -> Result<Self, Refusal> {
-        let (mut config, choice) = config.with_level_chosen()?;
+        let (mut config, chosen) = config.with_level_chosen(folder, given.as_ref())?;
         if i64::try_from(config.seed).is_err() {
             return Err(Refusal::new(format!("`seed` = {} is outside [0, 2^63)", config.seed)));
         }
@@ -237,13 +235,12 @@ impl Mechanics {
             };
         let asked = config.timestep_s.unwrap_or(Timestep::Seconds(default_step_s)).checked()?;
         // a step that was chosen, not written, gives way to a stiffer scene
-        let asked = if choice.is_some() { Timestep::Auto } else { asked };
+        let asked = if chosen { Timestep::Auto } else { asked };
         if let Some(interval_s) = config.frame_interval_s {
             let valid = (SHORTEST_STEP_S..=LONGEST_FRAME_INTERVAL_S).contains(&interval_s);
             in_range("frame_interval_s", interval_s, valid, FRAME_INTERVAL_RANGE)?;
         }
         let between_frames_s = config.frame_interval_s.unwrap_or(interval_s);
-        let longest_step_s = choice.map_or(between_frames_s, |c| c.timestep_s.min(between_frames_s));
         let mut scene = Self {
             config,
             timestep_s: default_step_s,
@@ -267,8 +264,8 @@ impl Mechanics {
             Timestep::Seconds(step_s) if quasi_static => {
                 in_range("timestep_s", step_s, step_s <= LONGEST_STEP_S, "[1e-6, 2e-3] s")?
             }
-            Timestep::Auto if quasi_static => longest_step_s.min(LONGEST_STEP_S),
-            _ => limit.resolve(asked, longest_step_s)?,
+            Timestep::Auto if quasi_static => between_frames_s.min(LONGEST_STEP_S),
+            _ => limit.resolve(asked, between_frames_s)?,
         };
         scene.timestep_s = timestep_s;
         scene.config.timestep_s = Some(timestep_s.into());
@@ -473,11 +470,22 @@ impl Mechanics {
             }
             Task::Drop(ball) => {
                 let energy_j = ball.mass_kg * GRAVITY_M_PER_S2 * ball.height_m;
-                let curve = DepthCurve::up_to_energy(field, &body, energy_j);
-                curve.map_err(|error| {
-                    let (mass_kg, height_m) = (ball.mass_kg, ball.height_m);
-                    Refusal::new(format!("`drop.mass_kg` = {mass_kg} from `drop.height_m` = {height_m}: {error}"))
-                })?
+                let (mass_kg, height_m) = (ball.mass_kg, ball.height_m);
+                let refused = |why: String| {
+                    Refusal::new(format!("`drop.mass_kg` = {mass_kg} from `drop.height_m` = {height_m}: {why}"))
+                };
+                let curve = DepthCurve::up_to_energy(field, &body, energy_j).map_err(|e| refused(e.to_string()))?;
+                let squeezed_m = curve.depth_m(f64::INFINITY) - field.thickness_m();
+                let based = self.config.contact.get("model").and_then(toml::Value::as_str) != Some("half_space");
+                if based && squeezed_m > ball.radius_m {
+                    return Err(refused(format!(
+                        "the ball would be flattened by {:.1} mm on the base of the foam, and its surface is modelled up to \
+                         its radius of {:.1} mm; a smaller mass or height, or thicker foam, is needed",
+                        1e3 * squeezed_m,
+                        1e3 * ball.radius_m
+                    )));
+                }
+                curve
             }
         })
     }
@@ -606,7 +614,7 @@ fn rotated(rotation: &[[f64; 3]; 3], v: &[f64; 3]) -> [f64; 3] {
 
 #[cfg(test)]
 mod tests {
-    use crate::fidelity::{FidelityLevel, cheapest, measured};
+    use crate::fidelity::{FidelityLevel, Tolerance, measured};
     use crate::mechanics::{Mechanics, MechanicsConfig};
     use crate::world::World;
     use std::path::Path;
@@ -615,18 +623,43 @@ mod tests {
         Mechanics::from_toml(text, Path::new("")).map_err(|e| e.to_string())
     }
 
-    /// The scene is that of the cheapest row of the shipped table, explicit, and the same when it is read again.
+    /// Error of the taxels' pressures of the first press over those of another scene of the same frames.
+    fn error(found: &Mechanics, expected: &Mechanics) -> f64 {
+        let frames = |scene| -> Vec<_> { World::new(scene).unwrap().frames().map(Result::unwrap).collect() };
+        let (found, expected) = (frames(found), frames(expected));
+        assert!(found.len().abs_diff(expected.len()) <= 1);
+        let (mut off, mut all) = (0.0, 0.0);
+        for (a, b) in found.iter().zip(&expected) {
+            for (p, q) in a.pressure.values().iter().zip(b.pressure.values()) {
+                off += (p - q).powi(2);
+                all += q * q;
+            }
+        }
+        (off / all).sqrt()
+    }
+
+    /// A tolerance is kept against the layer on 24 cells a taxel, with the error that was expected; the scene says its
+    /// contact, and is the same when it is read again. Objects from wide and flat to thin, on the usual foam and on a
+    /// thick and soft one.
     #[test]
-    fn a_scene_takes_the_cheapest_level_that_meets_it() {
-        for (task, text) in [("press", "[press]\nobject = \"T\""), ("drop", "[drop]")] {
-            for tolerance in [0.3, 0.1] {
-                let choice = cheapest(measured(), task, tolerance).unwrap();
-                assert!(choice.taxel_rms_rel <= tolerance);
-                let scene = scene(&format!("tolerance = {tolerance}\n{text}")).unwrap();
+    fn a_tolerance_is_kept() {
+        let foams = ["", "thickness_m = 0.03\nstiffness_pa_per_m = 1e6\n"];
+        for (foam, object) in foams.into_iter().flat_map(|foam| ["smallT", "tennis", "X"].map(|object| (foam, object)))
+        {
+            let text = |head: &str, contact: &str| {
+                format!("{head}\n[contact]\n{contact}\n{foam}[press]\nobject = \"{object}\"")
+            };
+            let finest = "model = \"layer\"\ncells_per_taxel = 24";
+            let finest = scene(&text("timestep_s = \"auto\"", finest)).unwrap();
+            for tolerance in [0.05, 0.1, 0.3] {
+                let scene = scene(&text(&format!("tolerance = {tolerance}"), "")).unwrap();
                 let config = scene.config();
-                assert_eq!(config.contact["model"].as_str(), Some(choice.level.model));
-                assert_eq!(config.contact["cells_per_taxel"].as_integer(), i64::try_from(choice.cells_per_taxel).ok());
-                assert_eq!(config.tolerance, None);
+                let (expected, found) = (config.chosen.unwrap().error, error(&scene, &finest));
+                assert!(found <= tolerance && found <= 1.1 * expected + 0.01, "{object} {foam}: {found}, {expected}");
+                assert_eq!(
+                    (config.tolerance, config.chosen_for_tolerance),
+                    (None, Some(Tolerance::Pressure(tolerance)))
+                );
                 let again = Mechanics::from_toml(&scene.to_toml().unwrap(), Path::new("")).unwrap();
                 assert_eq!(again.config(), config);
             }
@@ -639,22 +672,15 @@ mod tests {
         let lines = include_str!("../../assets/fidelity.csv").lines().count();
         assert_eq!(measured().len(), lines - 1);
         assert!(measured().iter().all(|row| FidelityLevel::named(&row.level).is_some()));
-        for task in ["press", "drop"] {
-            assert!(cheapest(measured(), task, 1e-9).is_some());
-        }
     }
 
+    /// Squares are no larger than those of the usual pitch.
     #[test]
     fn a_larger_pitch_gets_more_cells() {
-        let text = "tolerance = 0.3\n[skin]\npitch_m = 0.03\nelectrode_m = 0.02\n[press]\nobject = \"T\"";
-        let wide: MechanicsConfig = toml::from_str(text).unwrap();
-        let usual = cheapest(measured(), "press", 0.3).unwrap().cells_per_taxel;
-        let scene = Mechanics::new(wide, Path::new("")).unwrap();
-        let cells = scene.config().contact["cells_per_taxel"].as_integer();
-        assert_eq!(cells, i64::try_from(2 * usual).ok());
-        let vast = "tolerance = 0.03\n[skin]\npitch_m = 0.1\nelectrode_m = 0.05\n[press]\nobject = \"T\"";
-        let error = self::scene(vast).unwrap_err();
-        assert!(error.contains("pitch"), "{error}");
+        let head = "tolerance = 0.3\n[press]\nobject = \"T\"\n[skin]\n";
+        let cells =
+            |skin: &str| scene(&format!("{head}{skin}")).unwrap().config().contact["cells_per_taxel"].as_integer();
+        assert_eq!(cells("pitch_m = 0.03\nelectrode_m = 0.02"), cells("").map(|cells| 2 * cells));
     }
 
     /// The field at the pose of a frame on the plateau, where nothing moves, gives the frame's force again: to the

@@ -62,7 +62,7 @@ typo = 1 ; [drop] => unknown field `typo`
 [press] ; mesh = "nowhere.obj" ; scale = 0.0 => press.scale | (0, 1000]
 [press] ; object = "T" ; scale = nan => `press.scale` = NaN | (0, 1000]
 [press] ; object = "T" ; scale = 2.0 => press.scale | is for a mesh | "T"
-chosen_for_tolerance = nan ; [drop] => `chosen_for_tolerance` = NaN | (0, 1]
+chosen_for_tolerance = nan ; [drop] => `chosen_for_tolerance` = NaN | [0.03, 1]
 seed = 9223372036854775809 ; [drop] => 9223372036854775809
 skin.pitch_m = 1e308 ; [press] ; object = "T" => `skin.pitch_m` = 1e308 | [1e-6, 1] m
 [press] ; object = "T" ; position_m = [0.0, 9.0] => `press.position_m (y)` = 9 is outside [-0.1425, 0.1425] m
@@ -107,9 +107,16 @@ not toml => line 1:
 skin = { rows = 500, cols = 500 } ; contact.cells_per_taxel = 64 ; [drop] => cells_per_taxel | 2^24
 skin = { pitch_m = 1e-4, electrode_m = 5e-5 } ; contact.cells_per_taxel = 1 ; [press] ; object = "rec" ; force_n = 100.0 =>
     press.force_n | carries at most
+[drop] ; mass_kg = 50 => `drop.mass_kg` = 50 from `drop.height_m` = 0.5 | flattened by | radius of 33.4 mm
+[drop] ; radius_m = 0.005 ; mass_kg = 1 => `drop.mass_kg` = 1 | flattened
 tolerance = 0 ; [press] ; object = "T" => `tolerance` = 0 is outside [0.03, 1]
 tolerance = nan ; [press] ; object = "T" => `tolerance` = NaN is outside [0.03, 1]
 tolerance = 2 ; [press] ; object = "T" => `tolerance` = 2 is outside [0.03, 1]
+tolerance = { iou = 0.9 } ; [press] ; object = "T" => `tolerance.iou` = 0.9 is outside [0.005, 0.5]
+tolerance = { f1 = 0.1 } ; [press] ; object = "T" => tolerance | f1 | iou = number
+tolerance = { iou = 0.1, class = 0.1 } ; [press] ; object = "T" => tolerance | iou = number
+tolerance = "fine" ; [press] ; object = "T" => tolerance | fine | a number
+tolerance = 0.03 ; [bend] ; [press] ; object = "X" => `tolerance` = 0.03 | a bent skin takes columns alone
 tolerance = 0.1 ; timestep_s = 1e-4 ; [press] ; object = "T" => `tolerance` chooses | leave out `timestep_s`
 tolerance = 0.1 ; contact = { model = "winkler" } ; [press] ; object = "T" => leave out `contact.model`
 tolerance = 0.1 ; contact = { cells_per_taxel = 3 } ; [press] ; object = "T" => leave out `contact.cells_per_taxel`

@@ -78,7 +78,7 @@ const ONE_OF: [OneOf; 2] = [
 fn conflict(a: &str, b: &str) -> bool {
     let tolerance = |a: &str, b: &str| {
         let chosen = b.strip_prefix("contact.").is_some_and(|field| OF_TOLERANCE.contains(&field));
-        a == "tolerance" && (chosen || b == "timestep_s")
+        section(a) == "tolerance" && (chosen || b == "timestep_s")
     };
     let object = |a: &str, b: &str| a == "press.mesh" && b == "press.object";
     let ways = |(section_a, a): (&str, &str), (section_b, b): (&str, &str)| {
@@ -122,10 +122,10 @@ fn make_room(scene: &mut Table, key: &str, value: &Value) {
         }
     };
     match key {
+        _ if section(key) == "tolerance" => remove("contact", &OF_TOLERANCE),
         "press.mesh" => remove("press", &["object", "objects"]),
         "press.objects" => remove("press", &["object", "mesh", "scale", "repair", "centre"]),
         "press.object" => remove("press", &["objects", "mesh", "scale", "repair", "centre"]),
-        "tolerance" => remove("contact", &OF_TOLERANCE),
         _ => {}
     }
     for group in ONE_OF {
@@ -137,8 +137,11 @@ fn make_room(scene: &mut Table, key: &str, value: &Value) {
     if key == "skin.pitch_m" {
         forget_usual_electrode(scene);
     }
-    if key == "timestep_s" || section(key) == "contact" {
+    let decides = ["contact", "press", "drop", "skin", "bend", "timestep_s"].contains(&section(key));
+    if decides && !["press.presses", "drop.drops"].contains(&key) {
+        // what was chosen stays, and nothing is expected of it
         scene.remove("chosen_for_tolerance");
+        scene.remove("chosen");
     }
     if let ("contact.model", Some(name)) = (key, value.as_str()) {
         let contact = scene.entry("contact").or_insert_with(|| Value::Table(Table::new()));
@@ -146,10 +149,12 @@ fn make_room(scene: &mut Table, key: &str, value: &Value) {
             change_model(contact, name);
         }
     }
-    if key == "tolerance" {
+    if section(key) == "tolerance" {
         scene.remove("timestep_s");
+        // of one in another measure
+        scene.remove("tolerance");
     }
-    if ["tolerance", "timestep_s"].contains(&key) && scene.contains_key("drop") {
+    if ["tolerance", "timestep_s"].contains(&section(key)) && scene.contains_key("drop") {
         // one that a saved scene has written out belongs to the step it had
         scene.remove("frame_interval_s");
     }

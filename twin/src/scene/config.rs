@@ -5,7 +5,8 @@ use serde::{Deserialize, Serialize};
 use spts_circuit::WireConfig;
 use spts_input::Refusal;
 use spts_models::{SkinLayout, parsed, parsed_text};
-use spts_sim::mechanics::{BendConfig, DropConfig, MechanicsConfig, PressConfig, Timestep};
+use spts_sim::fidelity::Tolerance;
+use spts_sim::mechanics::{BendConfig, DropConfig, Expected, MechanicsConfig, PressConfig, Timestep};
 
 /// A scene as written in TOML. A missing field takes its default.
 ///
@@ -30,12 +31,15 @@ pub struct SceneConfig {
     /// Step of the dynamics; see [`MechanicsConfig::timestep_s`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub timestep_s: Option<Timestep>,
-    /// Largest acceptable relative error of the taxels' pressures; see [`MechanicsConfig::tolerance`].
+    /// The error that the scene may have; see [`MechanicsConfig::tolerance`].
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub tolerance: Option<f64>,
+    pub tolerance: Option<Tolerance>,
     /// Tolerance for which a saved scene was chosen; see [`MechanicsConfig::chosen_for_tolerance`].
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub chosen_for_tolerance: Option<f64>,
+    pub chosen_for_tolerance: Option<Tolerance>,
+    /// What was expected of that choice; see [`MechanicsConfig::chosen`].
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub chosen: Option<Expected>,
     /// Time between frames, s; see [`MechanicsConfig::frame_interval_s`].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub frame_interval_s: Option<f64>,
@@ -86,6 +90,7 @@ impl SceneConfig {
             timestep_s: self.timestep_s,
             tolerance: self.tolerance,
             chosen_for_tolerance: self.chosen_for_tolerance,
+            chosen: self.chosen,
             frame_interval_s: self.frame_interval_s,
             skin: self.skin,
             contact: self.contact.clone(),
@@ -125,6 +130,7 @@ impl SceneConfig {
             timestep_s: mechanics.timestep_s,
             tolerance: mechanics.tolerance,
             chosen_for_tolerance: mechanics.chosen_for_tolerance,
+            chosen: mechanics.chosen,
             frame_interval_s: mechanics.frame_interval_s,
             skin: mechanics.skin,
             contact: mechanics.contact,

@@ -23,6 +23,7 @@ mod tests;
 pub use crate::assign::Assignment;
 pub use crate::chain::RowsConfig;
 pub use config::SceneConfig;
+pub use spts_sim::fidelity::Tolerance;
 pub use spts_sim::mechanics::{BendConfig, DropConfig, Mechanics, MechanicsConfig, PressConfig, Task, Timestep};
 
 use crate::chain::{Chain, DEFAULT_READOUT, DEFAULT_TRANSDUCER, DEFAULT_WEIGHTS, read_gains};

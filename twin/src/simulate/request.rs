@@ -7,6 +7,7 @@ use crate::session::Session;
 use spts_contact::mesh::{MAX_FILE_BYTES, MeshReport};
 use spts_input::{InputError, Refusal};
 use spts_models::REFERENCE_PA;
+use spts_sim::fidelity::LEVELS;
 use spts_sim::mechanics::Mechanics;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
@@ -218,11 +219,29 @@ fn chosen(mechanics: &Mechanics) -> Option<String> {
     let config = mechanics.config();
     let tolerance = config.chosen_for_tolerance?;
     let of = |key: &str| config.contact.get(key).map(ToString::to_string).unwrap_or_default();
+    let coupled = config.contact.get("coupled").and_then(Value::as_bool);
+    let model = of("model");
+    let level = LEVELS.iter().find(|level| format!("\"{}\"", level.model) == model && level.coupled == coupled);
+    let expected = config.chosen.map(|expected| {
+        let task = if matches!(mechanics.task(), Task::Drop(_)) { "drop" } else { "press" };
+        let beyond = if expected.finest_error > tolerance.pressure(task).unwrap_or_default() {
+            let converged =
+                "the finest grid has not converged on this contact: halving its cells moved the pressures by";
+            format!("; {converged} {:.3}", expected.finest_error)
+        } else {
+            String::new()
+        };
+        format!(
+            ", with an expected error of the pressures of {:.3}; the finest takes {:.0} times as long{beyond}",
+            expected.error, expected.saves
+        )
+    });
     Some(format!(
-        "the tolerance of {tolerance} chose the contact field {}, {} cells along a taxel and steps of {} s",
-        of("model"),
+        "the tolerance of {tolerance} chose the contact field {model}, {} cells along a taxel and steps of {} s{}; left out: {}",
         of("cells_per_taxel"),
-        mechanics.timestep_s()
+        mechanics.timestep_s(),
+        expected.unwrap_or_default(),
+        level.map_or("nothing", |level| level.leaves_out)
     ))
 }
 
