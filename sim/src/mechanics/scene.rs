@@ -639,19 +639,16 @@ mod tests {
     }
 
     /// A tolerance is kept against the layer on 24 cells a taxel, with the error that was expected; the scene says its
-    /// contact, and is the same when it is read again. Objects from wide and flat to thin, on the usual foam and on a
-    /// thick and soft one.
+    /// contact, and is the same when it is read again. A round and a thin object, and that on thinner foam.
     #[test]
     fn a_tolerance_is_kept() {
-        let foams = ["", "thickness_m = 0.03\nstiffness_pa_per_m = 1e6\n"];
-        for (foam, object) in foams.into_iter().flat_map(|foam| ["smallT", "tennis", "X"].map(|object| (foam, object)))
-        {
+        for (foam, object) in [("", "tennis"), ("", "X"), ("thickness_m = 0.002\n", "X")] {
             let text = |head: &str, contact: &str| {
                 format!("{head}\n[contact]\n{contact}\n{foam}[press]\nobject = \"{object}\"")
             };
             let finest = "model = \"layer\"\ncells_per_taxel = 24";
             let finest = scene(&text("timestep_s = \"auto\"", finest)).unwrap();
-            for tolerance in [0.05, 0.1, 0.3] {
+            for tolerance in [0.05, 0.3] {
                 let scene = scene(&text(&format!("tolerance = {tolerance}"), "")).unwrap();
                 let config = scene.config();
                 let (expected, found) = (config.chosen.unwrap().error, error(&scene, &finest));

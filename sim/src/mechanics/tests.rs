@@ -108,7 +108,7 @@ skin = { rows = 500, cols = 500 } ; contact.cells_per_taxel = 64 ; [drop] => cel
 skin = { pitch_m = 1e-4, electrode_m = 5e-5 } ; contact.cells_per_taxel = 1 ; [press] ; object = "rec" ; force_n = 100.0 =>
     press.force_n | carries at most
 [drop] ; mass_kg = 50 => `drop.mass_kg` = 50 from `drop.height_m` = 0.5 | flattened by | radius of 33.4 mm
-[drop] ; radius_m = 0.005 ; mass_kg = 1 => `drop.mass_kg` = 1 | flattened
+[drop] ; radius_m = 0.005 ; mass_kg = 0.3 => `drop.mass_kg` = 0.3 | flattened
 tolerance = 0 ; [press] ; object = "T" => `tolerance` = 0 is outside [0.03, 1]
 tolerance = nan ; [press] ; object = "T" => `tolerance` = NaN is outside [0.03, 1]
 tolerance = 2 ; [press] ; object = "T" => `tolerance` = 2 is outside [0.03, 1]
