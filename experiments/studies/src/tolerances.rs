@@ -36,7 +36,7 @@ const FORCE_N: [f64; 3] = [1.0, 20.0, 100.0];
 
 /// Most steps of a press on the finest level; beyond that it is solved for frames alone, which differs by less than 1 %
 /// in every press of the shipped table.
-const MOST_STEPS: f64 = 4000.0;
+const MOST_STEPS: f64 = 1600.0;
 const FOR_FRAMES: &str = "layer_after";
 
 /// One scene with one tolerance.
@@ -84,6 +84,9 @@ pub struct ToleranceReport {
     #[serde(skip)]
     pub provenance: Provenance,
 }
+
+/// The hash of a scene and its rows; or the scene and why it cannot be.
+type SceneRows = Result<(String, Vec<ToleranceRow>), [String; 2]>;
 
 impl ToleranceStudy {
     /// Runs every scene on the finest level, and with every tolerance. Scenes are drawn from all objects on all foams,
@@ -136,8 +139,8 @@ impl ToleranceStudy {
         Ok(ToleranceReport { rows, refused, provenance: Provenance::new(self.seed, combined_hash(&hashes)) })
     }
 
-    /// The hash of the scene and its rows; or the scene and why it cannot be.
-    fn scene(&self, config: &SceneConfig) -> Result<Result<(String, Vec<ToleranceRow>), [String; 2]>, Refusal> {
+    /// The scene on the finest level and with every tolerance.
+    fn scene(&self, config: &SceneConfig) -> Result<SceneRows, Refusal> {
         let Some(press) = &config.press else {
             return Err(Refusal::new("a scene of the study has no press"));
         };

@@ -615,7 +615,7 @@ fn rotated(rotation: &[[f64; 3]; 3], v: &[f64; 3]) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use crate::fidelity::{FidelityLevel, Tolerance, measured};
-    use crate::mechanics::{Mechanics, MechanicsConfig};
+    use crate::mechanics::Mechanics;
     use crate::world::World;
     use std::path::Path;
 
