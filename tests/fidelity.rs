@@ -60,7 +60,8 @@ fn a_saved_scene_changes_its_fidelity_level() {
 }
 
 /// The full chain beside the chosen one: scores of both, the difference of what was asked for and whether it is within;
-/// and errors that are asked for on scenes that no table was measured on. Without a tolerance there is nothing to check.
+/// and errors that are asked for on scenes that no table was measured on. Without a tolerance there is nothing to
+/// check.
 #[test]
 fn tolerances_are_checked() {
     let dir = tempfile::tempdir().unwrap();

@@ -282,8 +282,8 @@ pub trait ContactField: Send {
     /// dynamics. It has the same normal force `force_n`. `None` if the answer itself is the best, or if there is none:
     /// then [`ContactField::failure`] gives the reason, and a simulation stops with an error.
     ///
-    /// Called after [`ContactField::respond`] with the same body, for frames only, in their order: a frame of a slow press
-    /// may be interpolated between earlier ones.
+    /// Called after [`ContactField::respond`] with the same body, for frames only, in their order: a frame of a slow
+    /// press may be interpolated between earlier ones.
     fn refine(&mut self, _body: &PosedMesh<'_>, _force_n: f64) -> Option<&[f64]> {
         None
     }

@@ -394,7 +394,8 @@ pub(crate) fn choose(
     )))
 }
 
-/// The finest level that the whole skin of `scene` can have, and its cells along a taxel. A bent skin takes columns alone.
+/// The finest level that the whole skin of `scene` can have, and its cells along a taxel. A bent skin takes columns
+/// alone.
 pub fn finest(scene: &Mechanics) -> (&'static FidelityLevel, usize) {
     let bent = scene.config().bend.is_some();
     let level = FidelityLevel::named(if bent { "winkler" } else { REFERENCE }).unwrap_or(&LEVELS[0]);

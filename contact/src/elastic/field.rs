@@ -495,8 +495,8 @@ fn deepest(parts: &[Part], cell_m: f64) -> (f64, f64) {
     (share.min(1.0), moment / share)
 }
 
-/// Columns for the dynamics. Under a body that is announced and wide their cells may be larger than those of the frames:
-/// a rim counts by what it covers of them.
+/// Columns for the dynamics. Under a body that is announced and wide their cells may be larger than those of the
+/// frames: a rim counts by what it covers of them.
 struct Columns {
     skin: SkinLayout,
     layer: WinklerLayer,

@@ -125,10 +125,10 @@ fn refuses_what_it_cannot_do() {
     assert!(error.to_string().contains("2^20"), "{error}");
 }
 
-/// A press that comes down slowly and goes up again: in every frame the taxels feel what they feel in it by itself, within
-/// the 0.1 % of the middle of a ball (`forces::RATIO`), and four times as much for the rim of a contact that grows cell
-/// by cell; its force is exact. A frame that moves, is moved aside or is of another surface stands for itself, bit for bit but for
-/// where the iteration starts.
+/// A press that comes down slowly and goes up again: in every frame the taxels feel what they feel in it by itself,
+/// within the 0.1 % of the middle of a ball (`forces::RATIO`), and four times as much for the rim of a contact that
+/// grows cell by cell; its force is exact. A frame that moves, is moved aside or is of another surface stands for
+/// itself: it differs by where the iteration starts alone.
 #[test]
 fn frames_between_two_forces() {
     let config = ElasticConfig { coupled: false, ..ElasticConfig::default() };

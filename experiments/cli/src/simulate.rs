@@ -117,9 +117,9 @@ pub(super) struct SimulateCommand {
     #[arg(long, value_name = "N", value_parser = whole::<u32>(1..=64))]
     cells: Option<u32>,
     /// The error that the scene may have against the finest contact: E, the relative error of the taxels' pressures,
-    /// [0.03, 1]; or iou=E or class=E, the change of that score, [0.005, 0.5]. The twin takes the cheapest contact model
-    /// and grid that keep to it on this scene's contact, and the longest stable step [default: none; --contact, --cells
-    /// and --timestep choose them]
+    /// [0.03, 1]; or iou=E or class=E, the change of that score, [0.005, 0.5]. The twin takes the cheapest contact
+    /// model and grid that keep to it on this scene's contact, and the longest stable step [default: none; --contact,
+    /// --cells and --timestep choose them]
     #[arg(long, value_name = "E", conflicts_with_all = ["contact", "cells", "timestep"])]
     tolerance: Option<Tolerance>,
     /// Runs the full chain beside the one that a tolerance chose, on the first two presses or drops of this scene, and
