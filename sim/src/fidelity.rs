@@ -1,6 +1,6 @@
 //! Fidelity levels of the contact: the measured cost and error of each, and the choice of one for a given tolerance.
 
-use crate::mechanics::{Mechanics, Task};
+use crate::mechanics::{Mechanics, PressConfig, Task};
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use spts_contact::{Holder, Load, PosedMesh, TaxelBins, build_contact};
 use spts_input::Refusal;
@@ -317,15 +317,15 @@ const MOST_CELLS: usize = 64;
 /// Most grid squares of an elastic field.
 const MOST_SQUARES: f64 = (1_u64 << 20) as f64;
 /// What a press at rest is off by because its force follows the course without the arm's dynamics: the largest over
-/// objects, foams and forces from 1 to 100 N.
+/// objects, foams and forces from 1 to 100 N, with the usual rise and fall. Faster ones need the dynamics.
 const AT_REST: f64 = 0.06;
 /// What columns under the dynamics are off by in the course of the force, against a field that is solved at every step.
 const COURSE: f64 = 0.015;
 /// Share of the tolerance that a held pose may take: other presses of the scene stand a little differently.
 const MARGIN: f64 = 0.9;
-/// The light force or depth that is tried besides the scene's own, relative to that, and the weight of its error.
-const LIGHT: f64 = 0.25;
-const LIGHT_WEIGHT: f64 = 0.5;
+/// What is tried: shares of the scene's own force or depth, with the weights of their errors, and how far the body is
+/// moved along rows and columns, in taxels. All of a small body may be over one taxel, and then over four.
+const POSES: [(f64, f64, f64); 3] = [(1.0, 1.0, 0.0), (0.25, 0.5, 0.0), (1.0, 1.0, 0.5)];
 
 /// Tries the levels on the contact of `scene`, a scene of columns, whose other parameters of `[contact]` are `contact`.
 /// Of those that keep to the tolerance it takes the cheapest that the scene `can_have`.
@@ -412,17 +412,17 @@ fn cost(task: &str, level: &str, cells_per_taxel: usize) -> f64 {
     costs.iter().sum::<f64>() / costs.len() as f64
 }
 
-/// Taxels' pressures of a level at the scene's force and at a light one.
-type Held = [Vec<f64>; 2];
+/// Taxels' pressures of a level in the poses that are tried.
+type Held = [Vec<f64>; POSES.len()];
 
-/// The larger relative difference of the two; infinite if there is none.
+/// The largest relative difference; infinite if there is none.
 fn difference(found: &Held, expected: &Held) -> f64 {
     let relative = |k: usize| {
         let off: f64 = found[k].iter().zip(&expected[k]).map(|(p, q)| (p - q).powi(2)).sum();
         let relative = (off / expected[k].iter().map(|q| q * q).sum::<f64>()).sqrt();
         if relative.is_nan() { f64::INFINITY } else { relative }
     };
-    relative(0).max(LIGHT_WEIGHT * relative(1))
+    (0..).zip(POSES).map(|(k, (_, weight, _))| weight * relative(k)).fold(0.0, f64::max)
 }
 
 /// The contact of a scene on the part of the skin that is under the body.
@@ -431,8 +431,8 @@ struct Trial<'a> {
     contact: &'a toml::Table,
     skin: SkinLayout,
     body: PosedMesh<'a>,
-    /// Force, N, and depth, m, of the scene and of a light touch.
-    held: [[f64; 2]; 2],
+    /// Force, N, and depth, m, of the poses that are tried.
+    held: [[f64; 2]; POSES.len()],
     finest: usize,
 }
 
@@ -442,11 +442,11 @@ impl<'a> Trial<'a> {
         let curve = scene.depth_curve();
         let held = match scene.task() {
             Task::Press(press) => {
-                [1.0, LIGHT].map(|share| [share * press.force_n, curve.depth_m(share * press.force_n)])
+                POSES.map(|(share, ..)| [share * press.force_n, curve.depth_m(share * press.force_n)])
             }
             Task::Drop(_) => {
                 let deepest_m = curve.depth_m(f64::INFINITY);
-                [1.0, LIGHT].map(|share| [f64::NAN, share * deepest_m])
+                POSES.map(|(share, ..)| [f64::NAN, share * deepest_m])
             }
         };
         let whole = *scene.skin();
@@ -470,9 +470,13 @@ impl<'a> Trial<'a> {
 
     /// Whether a scene of this task can have the level.
     fn takes(&self, level: &FidelityLevel) -> bool {
-        let press = matches!(self.scene.task(), Task::Press(_));
+        let usual = PressConfig::default();
+        let slow = match self.scene.task() {
+            Task::Press(press) => press.rise_s >= usual.rise_s && press.fall_s >= usual.fall_s,
+            Task::Drop(_) => false,
+        };
         // never the best: a half-space has no base under it
-        level.name != "half_space" && (press || level.dynamic)
+        level.name != "half_space" && (slow || level.dynamic)
     }
 
     /// Most cells a taxel that the whole skin can have.
@@ -499,8 +503,10 @@ impl<'a> Trial<'a> {
         field.expect(self.scene.mesh());
         let bins = TaxelBins::new(&self.skin, cells_per_taxel);
         let mut held = Held::default();
-        for (out, [force_n, depth_m]) in held.iter_mut().zip(self.held) {
-            let body = lowered(self.body, depth_m);
+        for ((out, [force_n, depth_m]), (.., moved)) in held.iter_mut().zip(self.held).zip(POSES) {
+            let mut body = lowered(self.body, depth_m);
+            body.position_m[0] += moved * self.skin.pitch_m();
+            body.position_m[1] += moved * self.skin.pitch_m();
             let [x, y, _] = body.position_m;
             let load = Load { force_n, axis_m: [x, y], holder: Holder::Rigid, from: None };
             let [pressure, _] = if let Some(columns) = field.quasi_static() {
