@@ -155,7 +155,8 @@ fn energy_never_grows() {
                             // too much for the foam, or so stiff that no step resolves it
                             Err(told) => {
                                 let told = told.to_string();
-                                let heavy = mass_kg > 1.0 && told.contains("absorbs at most");
+                                let most = ["absorbs at most", "would be flattened"];
+                                let heavy = mass_kg > 1.0 && most.iter().any(|most| told.contains(most));
                                 assert!(heavy || told.contains("no valid `timestep_s`"), "{drop:?}: {told}");
                             }
                         }
@@ -165,7 +166,7 @@ fn energy_never_grows() {
         }
     }
     // of 108; most of the others are 50 kg from 0.5 m and more
-    assert!(carried >= 90, "{carried}");
+    assert!(carried >= 88, "{carried}");
 }
 
 /// The same at 10 µs, whatever the limit allows; and at the limit on the elastic fields, whose columns pull at each
