@@ -6,7 +6,7 @@ use crate::{Origin, write_all_or_none};
 use spts::output::{OutputFolder, write_bytes, write_json, write_table};
 use spts_eval::{Table, unique};
 use spts_input::Refusal;
-use spts_sim::fidelity::{FidelityLevel, LEVELS, MeasuredSetting};
+use spts_sim::fidelity::{FidelityLevel, LEVELS, MeasuredSetting, Tolerance};
 use spts_studies::fidelity::{FidelityReport, FinePressure, ToleranceCheck};
 use spts_studies::tolerances::{ToleranceReport, ToleranceRow};
 
@@ -166,7 +166,12 @@ pub fn check_text(check: &ToleranceCheck) -> String {
         .shown("readout and decoding, s", |(_, c)| c.readout_s)
         .digits(2);
     let ToleranceCheck { tolerance, difference, pressure_error, saves, .. } = check;
-    let met = if check.met { "met" } else { "NOT met" };
+    let met = match tolerance {
+        _ if check.met => "met",
+        Tolerance::Iou(most) if check.full.iou <= *most => "NOT judged, since the full chain itself sees nothing here",
+        Tolerance::Class(most) if check.full.class <= *most => "NOT judged, since the full chain itself knows no class",
+        _ => "NOT met",
+    };
     format!(
         "\n\n{}\ntolerance of {tolerance}: {met}, the difference is {difference:.4}; the taxels' pressures differ by \
          {pressure_error:.4}, and the full chain took {saves:.1} times as long",

@@ -770,7 +770,7 @@ pub struct ToleranceCheck {
     pub pressure_error: f64,
     /// The difference in what the tolerance is about.
     pub difference: f64,
-    /// Whether it is within the tolerance.
+    /// Whether it is within the tolerance; false where the full chain itself scores less than that, which says nothing.
     pub met: bool,
     /// Times that the full chain took as long.
     pub saves: f64,
@@ -837,13 +837,15 @@ impl ToleranceCheck {
         };
         let (chosen, full) = (chain(&chosen, &found)?, chain(&reference.at_reference, &reference.scored)?);
         progress.end();
-        let (difference, most) = match tolerance {
-            Tolerance::Pressure(most) => (pressure_error, most),
-            Tolerance::Iou(most) => ((chosen.iou - full.iou).abs(), most),
-            Tolerance::Class(most) => ((chosen.class - full.class).abs(), most),
+        let (difference, most, seen) = match tolerance {
+            Tolerance::Pressure(most) => (pressure_error, most, 1.0),
+            Tolerance::Iou(most) => ((chosen.iou - full.iou).abs(), most, full.iou),
+            Tolerance::Class(most) => ((chosen.class - full.class).abs(), most, full.class),
         };
+        // a score that is itself below the tolerance cannot differ by more
+        let met = difference <= most && seen > most;
         let saves = (full.contact_s + full.readout_s) / (chosen.contact_s + chosen.readout_s);
-        Ok(Self { tolerance, chosen, full, pressure_error, difference, met: difference <= most, saves })
+        Ok(Self { tolerance, chosen, full, pressure_error, difference, met, saves })
     }
 }
 
