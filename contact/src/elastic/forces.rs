@@ -2,8 +2,8 @@
 
 use crate::field::{Patch, PosedMesh};
 
-/// Ratio of neighbouring forces. Between them a pressure that grows with a power of the force, as p ∝ F^a, is off by at
-/// most a |a − 1| ln²(ratio)/8: by 0.1 % for a = 1/3, the middle of a ball.
+/// Ratio of neighbouring forces. Between them a pressure that grows with a power of the force, as p ∝ F^a, is off by
+/// at most a |a − 1| ln²(ratio)/8: by 0.1 % for a = 1/3, the middle of a ball.
 const RATIO: f64 = 1.2;
 /// How far a body may stand from where the pressure was solved: sideways in cells; and relative to its depth, by how
 /// much a tilt lowers its rim, and by how much it moves within the damping time.

@@ -49,8 +49,8 @@ pub(super) struct FidelityCommand {
     #[arg(long)]
     quick: bool,
     /// Instead: measures whether errors that are asked for are kept, on scenes drawn from all objects on foams of 2, 6
-    /// and 30 mm, 10⁶ to 10⁸ Pa/m, pitches of 15, 5 and 3 mm, and forces of 1, 20 and 100 N; each [0.03, 1] [default:
-    /// none]
+    /// and 30 mm, 10⁶ to 10⁸ Pa/m, pitches of 15, 5 and 3 mm, and forces of 1, 20 and 100 N; each [0.03, 1]
+    /// [default: none]
     #[arg(long, value_delimiter = ',', value_name = "E,…", value_parser = number, conflicts_with_all = ["scene", "cells", "quick"])]
     tolerances: Vec<f64>,
     /// Number of scenes for --tolerances

@@ -220,8 +220,8 @@ fn chosen(mechanics: &Mechanics) -> Option<String> {
     let tolerance = config.chosen_for_tolerance?;
     let of = |key: &str| config.contact.get(key).map(ToString::to_string).unwrap_or_default();
     let coupled = config.contact.get("coupled").and_then(Value::as_bool);
-    let model = of("model");
-    let level = LEVELS.iter().find(|level| format!("\"{}\"", level.model) == model && level.coupled == coupled);
+    let model = config.contact.get("model").and_then(Value::as_str).unwrap_or_default();
+    let level = LEVELS.iter().find(|level| level.model == model && level.coupled == coupled);
     let expected = config.chosen.map(|expected| {
         let task = if matches!(mechanics.task(), Task::Drop(_)) { "drop" } else { "press" };
         let beyond = if expected.finest_error > tolerance.pressure(task).unwrap_or_default() {
@@ -237,7 +237,7 @@ fn chosen(mechanics: &Mechanics) -> Option<String> {
         )
     });
     Some(format!(
-        "the tolerance of {tolerance} chose the contact field {model}, {} cells along a taxel and steps of {} s{}; left out: {}",
+        "the tolerance of {tolerance} chose the contact field {model:?}, {} cells along a taxel and steps of {} s{}; left out: {}",
         of("cells_per_taxel"),
         mechanics.timestep_s(),
         expected.unwrap_or_default(),
