@@ -1,4 +1,5 @@
-"""Press, record, decode and score skins of growing size: CPU time, memory and IoU, as docs/skins.md shows it.
+"""Press, record, decode and score skins of growing size: CPU time, memory and IoU at M = N/20, and the M that an IoU of
+0.8 takes, as docs/skins.md shows it.
 
 python scripts/large.py [--wires N] [SIDE ...]     (needs `spts`, the command; sides of the skins in taxels)
 
@@ -13,6 +14,7 @@ import subprocess
 import tempfile
 
 SIDES = [10, 32, 64, 100, 256, 480]
+WANTED_IOU = 0.8
 GOLDEN_RAD = math.pi * (3 - math.sqrt(5))
 
 
@@ -54,12 +56,27 @@ def spts(*arguments, folder):
         return output.read().decode(), used.ru_utime + used.ru_stime, used.ru_maxrss / 1024
 
 
+def enough(side, folder):
+    """The least power of two of measurements with the wanted IoU, up to a half of the taxels; a dash for none."""
+    tried = [2**k for k in range(4, 15) if 2 * 2**k <= side * side]
+    measurements = ",".join(map(str, tried))
+    text, _, _ = spts(
+        "decode", "s", "--measurements", measurements, "--decoder", "auto", "--json", "--out", "m", folder=folder
+    )
+    best = {}
+    for row in json.loads(text)["rows"]:
+        best.setdefault(row["m"], []).append(row["iou"])
+    good = [m for m, ious in sorted(best.items()) if sum(ious) / len(ious) >= WANTED_IOU]
+    return f"{good[0]:,}" if good else "–"
+
+
 def main():
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--wires", type=int, default=1, help="wires of every skin [default: 1]")
     parser.add_argument("sides", type=int, nargs="*", default=SIDES, help="taxels along a side")
     asked = parser.parse_args()
-    print("| taxels | M | press, s | decode, s | score, s | largest memory, MB | IoU |\n|---|---|---|---|---|---|---|")
+    print("| taxels | M | press, s | decode, s | score, s | largest memory, MB | IoU | M for an IoU of 0.8 |")
+    print("|---|---|---|---|---|---|---|---|")
     points = []
     for side in asked.sides:
         taxels, few = side * side, -(-side * side // 20)
@@ -77,7 +94,8 @@ def main():
             iou = row["iou"]
             most = max(held, decoding, scoring)
             print(
-                f"| {taxels:,} | {few:,} | {press:.1f} | {decode:.1f} | {score:.1f} | {most:.0f} | {iou:.2f} |",
+                f"| {taxels:,} | {few:,} | {press:.1f} | {decode:.1f} | {score:.1f} | {most:.0f} | {iou:.2f} "
+                f"| {enough(side, folder)} |",
                 flush=True,
             )
             points.append((math.log(taxels), math.log(press + decode + score)))

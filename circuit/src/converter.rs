@@ -188,6 +188,11 @@ impl Converter {
         self.0.max_code
     }
 
+    /// Bytes of a code in a file: the smallest unsigned type that holds the codes and the mark of a missing sample.
+    pub fn code_bytes(&self) -> usize {
+        if self.max_code() < u32::from(u16::MAX) { size_of::<u16>() } else { size_of::<u32>() }
+    }
+
     /// What is taken from every volt before negative ones are set to 0, V.
     pub(crate) fn subtracted_v(&self) -> f64 {
         self.0.subtract_v.unwrap_or(0.0)

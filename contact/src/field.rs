@@ -397,7 +397,7 @@ pub trait QuasiStatic {
 #[non_exhaustive]
 pub enum EquilibriumError {
     /// There is contact, but not enough force.
-    #[error("the contact carries at most {reached_n:.4e} N, at {depth_m:.4} m depth, and {wanted_n:.4e} N are needed")]
+    #[error("the contact carries at most {reached_n:.4e} N, at {depth_m:.4} m depth; {wanted_n:.4e} N are needed, {:.1e} N more", wanted_n - reached_n)]
     Force {
         /// Largest force found, N.
         reached_n: f64,

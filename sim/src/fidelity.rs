@@ -134,6 +134,8 @@ pub struct MeasuredSetting {
     pub cost_us_per_step: f64,
     /// Wall time of a simulated second, s.
     pub cost_s_per_s: f64,
+    /// Wall time of one press or drop over the whole chain, s: contact, transducer, readout and decoding.
+    pub chain_s: f64,
     /// Error of the fine pressure: its root mean square relative to that of the reference.
     pub pressure_rms_rel: f64,
     /// Error of the taxels' pressures over the whole scene, in the same measure.

@@ -2,7 +2,7 @@
 
 use crate::context::{Bars, Common, note, open_folder};
 use crate::error::CliError;
-use crate::options::{number, seed, sorted, whole};
+use crate::options::{Side, number, seed, sorted, square, whole};
 use clap::Args;
 use spts_studies::fidelity::{FidelityStudy, SettingGrid};
 use spts_studies::tolerances::ToleranceStudy;
@@ -24,6 +24,7 @@ use std::path::PathBuf;
   spts fidelity
   spts fidelity --scene T --scene drop --out out/look
   spts fidelity --scene my_scene.toml --cells 3,6 --json
+  spts fidelity --taxels 1024
   spts fidelity --tolerances 0.05,0.1,0.2
 
 Files in DIR:
@@ -42,6 +43,10 @@ pub(super) struct FidelityCommand {
     /// sphere, punch, edge, T, tape, comb, drop, or FILE.toml; repeat for several [default: all seven]
     #[arg(long, value_name = "SCENE")]
     scene: Vec<String>,
+    /// Taxels of the skin of built-in scenes, which is as large as the published one: a square number in [16, 16384].
+    /// On other skins than the published one: at the default time steps alone, on at most 384 squares a side
+    #[arg(long, value_name = "N", default_value = "100", value_parser = square(4..=128))]
+    taxels: Side,
     /// Resolutions: grid squares along one side of a taxel; each [1, 24] [default: 2,3,6,12,24]
     #[arg(long, value_delimiter = ',', value_name = "N,…", value_parser = whole::<u16>(1..=24))]
     cells: Vec<u16>,
@@ -51,7 +56,7 @@ pub(super) struct FidelityCommand {
     /// Instead: measures whether errors that are asked for are kept, on scenes drawn from all objects on foams of 2, 6
     /// and 30 mm, 10⁶ to 10⁸ Pa/m, pitches of 15, 5 and 3 mm, and forces of 1, 20 and 100 N; each [0.03, 1]
     /// [default: none]
-    #[arg(long, value_delimiter = ',', value_name = "E,…", value_parser = number, conflicts_with_all = ["scene", "cells", "quick"])]
+    #[arg(long, value_delimiter = ',', value_name = "E,…", value_parser = number, conflicts_with_all = ["scene", "cells", "quick", "taxels"])]
     tolerances: Vec<f64>,
     /// Number of scenes for --tolerances
     #[arg(long, value_name = "N", default_value_t = 60, value_parser = whole::<u16>(1..=5000), requires = "tolerances")]
@@ -77,13 +82,14 @@ impl FidelityCommand {
             spts_report::fidelity::write_tolerances(&report, open_folder(&self.out)?)?;
             return self.common.print(&report, || spts_report::fidelity::tolerances_text(&report));
         }
-        let mut grid = if self.quick { SettingGrid::quick() } else { SettingGrid::full() };
+        let side = self.taxels.0;
+        let mut grid = if self.quick { SettingGrid::quick() } else { SettingGrid::of(side) };
         if !self.cells.is_empty() {
             let cells: Vec<usize> = sorted(self.cells.iter().copied().map(usize::from).collect());
             grid.reference_cells = grid.reference_cells.max(cells[cells.len() - 1]);
             grid.cells_per_taxel = cells;
         }
-        let study = FidelityStudy { scenes: self.scene, grid, seed: self.seed };
+        let study = FidelityStudy { scenes: self.scene, side, grid, seed: self.seed };
         let out = open_folder(&self.out)?;
         let report = study.run(&out.folder("scenes")?, &Bars::default())?;
         spts_report::fidelity::write(&report, out)?;

@@ -16,7 +16,6 @@ mod design;
 mod device;
 mod error;
 #[cfg(feature = "full")]
-mod explore;
 #[cfg(feature = "full")]
 mod fidelity;
 #[cfg(feature = "full")]
@@ -102,8 +101,6 @@ commands! {
     Circuit(circuit::CircuitCommand),
     #[cfg(feature = "full")]
     Design(Box<design::DesignCommand>),
-    #[cfg(feature = "full")]
-    Explore(explore::ExploreCommand),
     #[cfg(feature = "full")]
     Firmware(firmware::FirmwareCommand),
     #[cfg(feature = "full")]

@@ -1,6 +1,6 @@
 //! `spts record`: reads a device into a session.
 
-use crate::context::{Common, TICK, note, progress};
+use crate::context::{Common, TICK, check_room, note, progress};
 use crate::device::DeviceMode;
 use crate::error::CliError;
 use crate::options::{whole, within};
@@ -9,7 +9,6 @@ use rustix::fs::FlockOperation;
 use rustix::io::Errno;
 use serde::Serialize;
 use serial2::SerialPort;
-use spts::circuit::Converter;
 use spts::cleanup::Deferred;
 use spts::device::{Heard, Host};
 use spts::output::OutputFolder;
@@ -114,7 +113,8 @@ impl RecordCommand {
         let out = OutputFolder::open(&self.out)?;
         let mut session = self.session([f64::from(first) * frame_s, f64::from(end) * frame_s])?;
         let count = usize::try_from(self.blocks).unwrap_or(usize::MAX);
-        self.check_room(count.saturating_mul(FRAMES * frame * size_of_code(&converter)) as u64)?;
+        let bytes = count.saturating_mul(FRAMES * frame * converter.code_bytes()) as u64;
+        check_room(&self.out, &format!("`--blocks` = {}", self.blocks), bytes)?;
         if self.slot(&mut session).take().is_some() {
             note(&format!("note: the recording of this mode in {} is replaced", self.out.display()));
         }
@@ -255,20 +255,6 @@ impl RecordCommand {
         }
     }
 
-    /// Refuses a recording of `bytes` that the disk has no room for.
-    fn check_room(&self, bytes: u64) -> Result<(), Refusal> {
-        let there = self.out.ancestors().find(|above| above.is_dir()).unwrap_or(Path::new("."));
-        // a file system that does not say is tried
-        let Ok(found) = rustix::fs::statvfs(there) else { return Ok(()) };
-        let free = found.f_bavail.saturating_mul(found.f_frsize);
-        if bytes <= free {
-            return Ok(());
-        }
-        let mb = |bytes: u64| bytes as f64 / 1e6;
-        let problem = format!("`--blocks` = {} needs {:.0} MB; {:.0} MB are free", self.blocks, mb(bytes), mb(free));
-        Err(Refusal::new(problem).at(self.out.display()))
-    }
-
     /// The session that is there, or a new one.
     fn session(&self, hold_s: [f64; 2]) -> Result<Session, CliError> {
         let new = Session { hold_s: Some(hold_s), ..Session::new(&self.object, Event::Press) };
@@ -308,11 +294,6 @@ impl RecordCommand {
         let hold = &volts[first * frame..][..frame];
         mean(&mut hold.iter().map(|v| (v - rest_v).powi(2))).map(f64::sqrt)
     }
-}
-
-/// Bytes of a code in a session.
-fn size_of_code(converter: &Converter) -> usize {
-    if converter.max_code() < u32::from(u16::MAX) { size_of::<u16>() } else { size_of::<u32>() }
 }
 
 /// The end by a signal, with what is left.

@@ -1,6 +1,6 @@
 //! `spts simulate`: one scene, from its name to its result files.
 
-use crate::context::{Bars, Common, TICK, note, notes, open_folder, progress, spinner};
+use crate::context::{Bars, Common, TICK, check_room, left_note, note, notes, open_folder, progress, spinner};
 use crate::error::CliError;
 use crate::options::{number, seed, whole};
 use clap::Args;
@@ -20,6 +20,7 @@ use spts_report::animation::Animation;
 use spts_report::simulation::SimulationFiles;
 use spts_studies::fidelity::ToleranceCheck;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 use toml::Value;
 
 /// Simulates one scene and records it through the readout: a robot arm presses an object on the skin, or a ball bounces
@@ -251,9 +252,11 @@ impl SimulateCommand {
         }
         let out = self.out.clone();
         let out = out.unwrap_or_else(|| default_folder(&prepared));
+        let presses = prepared.scene.repeats();
+        check_room(&out, &format!("the results of {presses} presses or drops"), prepared.bytes(!self.no_record))?;
         let folder = open_folder(&out)?;
         let mut files = SimulationFiles::create(folder, &prepared, !self.no_record)?;
-        let bar = progress(prepared.scene.repeats(), "simulating");
+        let bar = progress(presses, "simulating");
         let done = || {
             bar.inc(1);
             if Some(bar.position()) == bar.length() {
@@ -263,8 +266,13 @@ impl SimulateCommand {
             }
         };
         let mut first: Vec<Frame> = Vec::new();
+        let started = Instant::now();
         let simulate = || {
             run(&prepared, !self.no_record, &done, |piece| {
+                if piece.first == 0 {
+                    let left = left_note(started, [piece.presses.len(), piece.of], "presses or drops");
+                    left.iter().for_each(|left| bar.suspend(|| note(left)));
+                }
                 if self.animate && piece.first == 0 {
                     first.extend(piece.presses.iter().take(1).flat_map(|press| press.frames.clone()));
                 }

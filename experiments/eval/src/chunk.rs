@@ -29,10 +29,11 @@ pub(crate) struct Chunk<'a> {
     recording: &'a Recording,
     /// Row of the first measurement according to the recording.
     first_row: u64,
-    /// Output minus its mean, V; 0 for a lost sample.
+    /// Output minus the mean of its wire, V; 0 for a lost sample.
     pub(crate) y: Vec<f64>,
     lost: Vec<bool>,
-    mean_v: f64,
+    /// Mean output of every wire, V.
+    means_v: Vec<f64>,
     /// Σ y².
     pub(crate) energy: f64,
 }
@@ -54,16 +55,22 @@ impl<'a> Chunk<'a> {
     pub(crate) fn new(recording: &'a Recording, block: usize, start: usize, len: usize) -> Self {
         let volts = &recording.blocks()[block].volts[start..start + len];
         let lost: Vec<bool> = volts.iter().map(|v| !v.is_finite()).collect();
-        let finite = || volts.iter().filter(|v| v.is_finite());
-        let mean = finite().sum::<f64>() / finite().count().max(1) as f64;
-        let y: Vec<f64> = volts.iter().map(|v| if v.is_finite() { v - mean } else { 0.0 }).collect();
+        let rows = recording.rows(block, start..start + len);
+        let mean = |wire: usize| {
+            let own = volts.iter().enumerate().filter(|(k, v)| v.is_finite() && rows.wire(*k) == wire);
+            let (sum, count) = own.fold((0.0, 0_usize), |(sum, count), (_, v)| (sum + v, count + 1));
+            sum / count.max(1) as f64
+        };
+        let means_v: Vec<f64> = (0..compressive_wires(recording)).map(mean).collect();
+        let above = |(k, v): (usize, &f64)| if v.is_finite() { v - means_v[rows.wire(k)] } else { 0.0 };
+        let y: Vec<f64> = volts.iter().enumerate().map(above).collect();
         Self {
             recording,
             first_row: recording.first_row(block, 0) + start as u64,
             energy: y.iter().map(|v| v * v).sum(),
             y,
             lost,
-            mean_v: mean,
+            means_v,
         }
     }
 
@@ -156,7 +163,7 @@ impl<'a> Chunk<'a> {
             direction.iter_mut().zip(&gradient).for_each(|(d, g)| *d = g + keep * *d);
             square = next;
         }
-        let offsets_v = image[taxels..].iter().map(|constant| self.mean_v + constant).collect();
+        let offsets_v = image[taxels..].iter().zip(&self.means_v).map(|(constant, mean)| mean + constant).collect();
         image.truncate(taxels);
         let residual = (dot(&left, &left) / self.energy).sqrt();
         residual.is_finite().then_some(Fit { rows, image, offsets_v, residual })

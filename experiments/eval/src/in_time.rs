@@ -358,7 +358,7 @@ fn drop(recording: &Recording, bounce: &RecordedBounce, cols: usize) -> Option<F
             centre: Some(centre),
         })
     });
-    let untouched = Untouched { offsets_v: vec![bounce.idle], image: None };
+    let untouched = bounce.untouched(recording);
     Some(FollowedContact {
         moments: moments.collect(),
         press: untouched.press(recording, bounce.block, first..bounce.end),

@@ -308,6 +308,8 @@ const SHARE: f64 = 0.1;
 const EXPLAINED: f64 = 0.5;
 /// Measurements that an image is estimated from, at most, for every taxel.
 const MEASUREMENTS_PER_TAXEL: usize = 100;
+/// Weights of these measurements at most: 1 GiB.
+const MOST_WEIGHTS: usize = 1 << 27;
 /// Measurements that it needs at least, for every taxel.
 const LEAST_PER_TAXEL: usize = 4;
 
@@ -328,11 +330,17 @@ impl Untouched {
         Self::in_frames(recording, block, frames)
     }
 
+    /// A skin without a preload, from the idle frames of block `block`: [`idle_means`].
+    pub fn flat(recording: &Recording, block: usize) -> Self {
+        Self { offsets_v: idle_means(recording, block), image: None }
+    }
+
     /// The untouched skin, from the first `frames` frames of the block.
     pub(crate) fn in_frames(recording: &Recording, block: usize, frames: usize) -> Self {
-        let flat = || Self { offsets_v: idle_means(recording, block), image: None };
+        let flat = || Self::flat(recording, block);
         let taxels = recording.taxels();
-        let idle = (frames * recording.measurements_per_frame()).min(MEASUREMENTS_PER_TAXEL * taxels);
+        let most = (MEASUREMENTS_PER_TAXEL * taxels).min(MOST_WEIGHTS / taxels);
+        let idle = (frames * recording.measurements_per_frame()).min(most);
         if recording.mode() != Mode::Compressive || idle < LEAST_PER_TAXEL * taxels {
             return flat();
         }

@@ -9,7 +9,6 @@ pub mod decode;
 pub mod design;
 pub mod electronics;
 mod error;
-pub mod explore;
 pub mod few_wires;
 pub mod fidelity;
 pub mod figures;

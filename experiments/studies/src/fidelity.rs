@@ -17,7 +17,7 @@ use spts_eval::decoders::{TrainedDecoder, published};
 use spts_eval::training::Learned;
 use spts_eval::{Press, Scorer, Tally, Window};
 use spts_input::Refusal;
-use spts_models::Streams;
+use spts_models::{SkinLayout, Streams};
 use spts_recon::Matrix;
 use spts_recon::classify::Library;
 use spts_recon::dictionary::{Ksvd, Selection, select};
@@ -33,6 +33,8 @@ use std::time::Instant;
 pub struct FidelityStudy {
     /// Names of built-in scenes, or scene files; empty for all built-in ones.
     pub scenes: Vec<String>,
+    /// Taxels along a side of the skin of built-in scenes, which is as large as the published one.
+    pub side: usize,
     /// Levels, resolutions and time steps.
     pub grid: SettingGrid,
     /// Seed of all random numbers.
@@ -70,7 +72,7 @@ impl FidelityStudy {
     /// # Errors
     /// [`Refusal`] if a scene is not usable, a reference cannot be run, or a mesh cannot be written.
     pub fn run(&self, meshes: &Path, progress: &dyn Progress) -> Result<FidelityReport, Refusal> {
-        let scenes = build(&self.scenes, self.seed, meshes)?;
+        let scenes = build(&self.scenes, self.side, self.seed, meshes)?;
         let runs: usize = scenes.iter().map(|s| self.grid.settings(s.is_drop()).len()).sum();
         progress.stage("running contact models", Some(scenes.len() + runs));
         let references = scenes
@@ -83,7 +85,7 @@ impl FidelityStudy {
                 Ok(Reference { learned: learned?, scored: scored?, at_reference, scene })
             })
             .collect::<Result<Vec<_>, Refusal>>()?;
-        let others = others(&references, self.seed, meshes)?.into_par_iter();
+        let others = others(&references, self.side, self.seed, meshes)?.into_par_iter();
         let others = others.filter_map(|scene| run_contact(&scene, 0, ONCE).ok().map(|run| (scene, run)));
         let learned = ReferenceScores::learn(&references, &others.collect::<Vec<_>>(), self.seed)?;
         let jobs: Vec<(usize, ContactSetting)> = (0..references.len())
@@ -108,8 +110,8 @@ impl FidelityStudy {
         }
         measured.extend(references.iter().enumerate().map(|(i, reference)| {
             let setting = self.grid.reference(reference.scene.is_drop());
-            let scored = &reference.scored;
-            (i, row(reference, scored, setting, taxel_error(scored, scored), [0.0; 3]))
+            let (scored, took_s) = (&reference.scored, learned.references[i].1);
+            (i, row(reference, scored, setting, taxel_error(scored, scored), ([0.0; 3], took_s)))
         }));
         // scene by scene, levels from cheap to dear, then resolution and step
         measured.sort_by_key(|(i, (row, _))| {
@@ -155,19 +157,19 @@ fn measure(
             }));
         }
     };
-    let (scores, truth) = (learned.score(&scene, &found, label)?, learned.references[label]);
+    let ((scores, took_s), (truth, _)) = (learned.score(&scene, &found, label)?, learned.references[label]);
     let deltas = [0, 1, 2].map(|k| scores[k] - truth[k]);
-    Ok(Ok(row(reference, &found, setting, taxel_rms_rel, deltas)))
+    Ok(Ok(row(reference, &found, setting, taxel_rms_rel, (deltas, took_s))))
 }
 
-/// The line of the table for `found`, with the error of the taxels' pressures and the changes of support accuracy, IoU
-/// and classification.
+/// The line of the table for `found`, with the error of the taxels' pressures, the changes of support accuracy, IoU and
+/// classification, and the time that recording and decoding took, s.
 fn row(
     reference: &Reference,
     found: &ContactRun,
     setting: ContactSetting,
     taxel_rms_rel: f64,
-    [support_delta, iou_delta, class_delta]: [f64; 3],
+    ([support_delta, iou_delta, class_delta], took_s): (ChainScores, f64),
 ) -> Measured {
     let row = MeasuredSetting {
         scene: reference.scene.name.clone(),
@@ -178,6 +180,7 @@ fn row(
         timestep_s: setting.timestep_s,
         cost_us_per_step: found.cost_us_per_step,
         cost_s_per_s: found.cost_s_per_s,
+        chain_s: found.cost_s_per_s * reference.at_reference.duration_s() + took_s,
         pressure_rms_rel: fine_error(&found.fine, &reference.scored.fine),
         taxel_rms_rel,
         support_delta,
@@ -216,6 +219,11 @@ struct ContactSetting {
     timestep_s: f64,
 }
 
+/// Taxels along a side of the published skin.
+pub const PUBLISHED_SIDE: usize = 10;
+/// Squares along a side of the finest grid of other skins.
+const MOST_SQUARES_A_SIDE: usize = 384;
+
 /// Time between the frames of a press, s: the one step of a level without dynamics.
 const FRAME_S: f64 = 2e-3;
 
@@ -228,6 +236,19 @@ impl SettingGrid {
             drop_steps_s: vec![5e-5, 1e-4, 2e-4],
             reference_cells: 24,
         }
+    }
+
+    /// The settings of a skin of `side` × `side` taxels: that of the shipped table for the published one; for others
+    /// squares down to a part of them that can be solved, at the default steps.
+    pub fn of(side: usize) -> Self {
+        let full = Self::full();
+        if side == PUBLISHED_SIDE {
+            return full;
+        }
+        let reference_cells = (MOST_SQUARES_A_SIDE / side.max(1)).clamp(1, full.reference_cells);
+        let mut cells = full.cells_per_taxel;
+        cells.retain(|cells| *cells <= reference_cells);
+        Self { cells_per_taxel: cells, press_steps_s: vec![5e-4], drop_steps_s: vec![1e-4], reference_cells }
     }
 
     /// Settings that take less than a minute.
@@ -302,7 +323,7 @@ impl FidelityScene {
 
 /// The built-in scenes called `names`, or read from files; all built-in ones when there is no name. Meshes that only
 /// the study has are written to `folder`.
-fn build(names: &[String], seed: u64, folder: &Path) -> Result<Vec<FidelityScene>, Refusal> {
+fn build(names: &[String], side: usize, seed: u64, folder: &Path) -> Result<Vec<FidelityScene>, Refusal> {
     let all: Vec<String> = SCENES.iter().map(|&name| name.to_owned()).collect();
     let names = if names.is_empty() { &all } else { names };
     let mut scenes: Vec<FidelityScene> = Vec::new();
@@ -310,7 +331,7 @@ fn build(names: &[String], seed: u64, folder: &Path) -> Result<Vec<FidelityScene
         let scene = if Path::new(name).extension().is_some_and(|e| e == "toml") {
             from_file(Path::new(name))?
         } else {
-            built_in(name, seed, folder)?
+            built_in(name, side, seed, folder)?
         };
         if scenes.iter().any(|s| s.name == scene.name) {
             return Err(Refusal::new(format!("`--scene {name}`: named twice")));
@@ -322,7 +343,7 @@ fn build(names: &[String], seed: u64, folder: &Path) -> Result<Vec<FidelityScene
 
 /// What else might be pressed: the built-in scenes that were not asked for, with everything at its default but the
 /// skin, which is that of the references. Those that such a skin cannot bear are left out.
-fn others(references: &[Reference], seed: u64, folder: &Path) -> Result<Vec<Scene>, Refusal> {
+fn others(references: &[Reference], side: usize, seed: u64, folder: &Path) -> Result<Vec<Scene>, Refusal> {
     let Some(first) = references.first() else {
         return Ok(Vec::new());
     };
@@ -335,13 +356,17 @@ fn others(references: &[Reference], seed: u64, folder: &Path) -> Result<Vec<Scen
     }
     let left = SCENES.iter().filter(|name| references.iter().all(|r| r.scene.name != **name));
     let scenes = left.map(|name| {
-        let config = SceneConfig { skin, ..built_in(name, seed, folder)?.config };
+        let config = SceneConfig { skin, ..built_in(name, side, seed, folder)?.config };
         Ok(Scene::new(config, folder).ok())
     });
     scenes.filter_map(Result::transpose).collect()
 }
 
-fn built_in(name: &str, seed: u64, folder: &Path) -> Result<FidelityScene, Refusal> {
+/// A built-in scene on `side` × `side` taxels.
+fn built_in(name: &str, side: usize, seed: u64, folder: &Path) -> Result<FidelityScene, Refusal> {
+    let published = SkinLayout::default();
+    let pitch_m = published.pitch_m() * PUBLISHED_SIDE as f64 / side as f64;
+    let skin = if side == PUBLISHED_SIDE { published } else { SkinLayout::with_pitch(side, side, pitch_m)? };
     let mut press = PressConfig { presses: REPEATS, ..PressConfig::default() };
     let mut ball = None;
     match name {
@@ -364,13 +389,19 @@ fn built_in(name: &str, seed: u64, folder: &Path) -> Result<FidelityScene, Refus
             let file = format!("{name}.obj");
             write_bytes(&folder.join(&file), mesh.to_obj(name).as_bytes())?;
             press.mesh = Some(file);
-            [press.row, press.col] = PLACE.map(Some);
+            [press.row, press.col] = PLACE.map(|at| Some((at + 0.5) * published.pitch_m() / pitch_m - 0.5));
             press.rotation_deg = Some(ROTATION_DEG);
         }
     }
     Ok(FidelityScene {
         name: name.to_owned(),
-        config: SceneConfig { seed, press: ball.is_none().then_some(press), drop: ball, ..SceneConfig::default() },
+        config: SceneConfig {
+            seed,
+            press: ball.is_none().then_some(press),
+            drop: ball,
+            skin,
+            ..SceneConfig::default()
+        },
         folder: folder.to_owned(),
     })
 }
@@ -611,7 +642,8 @@ type Images = Vec<Vec<f64>>;
 struct ReferenceScores {
     decoder: TrainedDecoder,
     truths: Vec<Truth>,
-    references: Vec<ChainScores>,
+    /// With the time of recording and decoding, s.
+    references: Vec<(ChainScores, f64)>,
 }
 
 /// The reference of a scene: when its frames were, what was pressed at them, and when the scores are taken.
@@ -656,8 +688,9 @@ impl ReferenceScores {
         Ok(learned)
     }
 
-    /// Records and decodes `run`, of the scene with the index `label`.
-    fn score(&self, scene: &Scene, run: &ContactRun, label: usize) -> Result<ChainScores, Refusal> {
+    /// Records and decodes `run`, of the scene with the index `label`; with the time that it took, s.
+    fn score(&self, scene: &Scene, run: &ContactRun, label: usize) -> Result<(ChainScores, f64), Refusal> {
+        let started = Instant::now();
         let truth = &self.truths[label];
         let of_task = match scene.task() {
             Task::Press(_) => Acquisition::presses,
@@ -693,7 +726,8 @@ impl ReferenceScores {
         let decisions: Vec<Option<usize>> = answers.iter().map(|a| scorer.class(a)).collect();
         tally.decisions(&decisions, label, decisions.len());
         let scores = tally.scores();
-        Ok([scores.support, scores.iou, scores.class_single].map(Option::unwrap_or_default))
+        let scores = [scores.support, scores.iou, scores.class_single].map(Option::unwrap_or_default);
+        Ok((scores, started.elapsed().as_secs_f64()))
     }
 }
 
@@ -812,7 +846,10 @@ impl ToleranceCheck {
         let seed = chosen.seed();
         // objects that need no file
         let others = ["T", "tape", "comb"].into_iter().filter(|name| *name != chosen.object()).filter_map(|name| {
-            let config = SceneConfig { skin: *chosen.skin(), ..built_in(name, seed, Path::new("")).ok()?.config };
+            let config = SceneConfig {
+                skin: *chosen.skin(),
+                ..built_in(name, PUBLISHED_SIDE, seed, Path::new("")).ok()?.config
+            };
             let scene = Scene::new(config, Path::new("")).ok()?;
             let run = run_contact(&scene, 0, ONCE).ok()?;
             Some((scene, run))
@@ -820,8 +857,7 @@ impl ToleranceCheck {
         let learned = ReferenceScores::learn(&references, &others.collect::<Vec<_>>(), seed)?;
         progress.step();
         let chain = |scene: &Scene, run: &ContactRun| {
-            let start = Instant::now();
-            let [support, iou, class] = learned.score(scene, run, 0)?;
+            let ([support, iou, class], readout_s) = learned.score(scene, run, 0)?;
             let mechanics = scene.mechanics();
             let contact = mechanics.config().contact.get("model").and_then(toml::Value::as_str).unwrap_or_default();
             Ok::<_, Refusal>(CheckedChain {
@@ -832,7 +868,7 @@ impl ToleranceCheck {
                 iou,
                 class,
                 contact_s: run.cost_s_per_s * scene.duration_s(),
-                readout_s: start.elapsed().as_secs_f64(),
+                readout_s,
             })
         };
         let (chosen, full) = (chain(&chosen, &found)?, chain(&reference.at_reference, &reference.scored)?);
@@ -892,6 +928,7 @@ mod tests {
         let meshes = tempfile::tempdir().unwrap();
         let study = FidelityStudy {
             scenes: scenes.iter().map(|&s| s.to_owned()).collect(),
+            side: PUBLISHED_SIDE,
             grid: SettingGrid {
                 cells_per_taxel: vec![2],
                 press_steps_s: vec![5e-4],

@@ -6,7 +6,6 @@ pub mod calibrate;
 pub mod compare;
 pub mod design;
 pub mod electronics;
-pub mod explore;
 pub mod few_wires;
 pub mod fidelity;
 pub mod firmware;

@@ -2,8 +2,7 @@
 //! of the readout that has both.
 
 use crate::electronics::ElectronicsStudy;
-use serde::Serialize;
-use spts_circuit::amplifier::{Amplifier, Budget, Limit, Network, Setting, Skin, fewest_wires};
+use spts_circuit::amplifier::{Amplifier, Budget, Network, Setting, Skin};
 use spts_circuit::{PROFILES, Profile, Seeding};
 use spts_input::Refusal;
 use spts_models::parsed_text;
@@ -12,58 +11,38 @@ use toml::{Table, Value};
 /// Share of the converter's range that a fitted feedback uses: the sum is Gaussian, and scenes differ.
 const HEADROOM: f64 = 0.8;
 
-/// How a skin is wired: ideal, on one wire, or on several.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "snake_case")]
-pub enum Way {
-    /// y = Φx on one wire without electronics: the requirements of the decoder alone.
-    Ideal,
-    /// One wire with the amplifier and the clock of `as_designed`.
-    AsDesigned,
-    /// One wire whose feedback is reduced until the sum fits the converter, and whose clock is slowed until the output
-    /// settles.
-    Fitted,
-    /// As many wires as the parts of `as_designed` need, each for a band of the skin's rows, read in parallel.
-    Wires,
-}
-
-impl Way {
-    /// Every wiring.
-    pub const ALL: [Self; 4] = [Self::Ideal, Self::AsDesigned, Self::Fitted, Self::Wires];
-
-    /// The wiring in words.
-    pub fn name(self) -> &'static str {
-        match self {
-            Self::Ideal => "ideal wire",
-            Self::AsDesigned => "one wire, as designed",
-            Self::Fitted => "one wire, fitted",
-            Self::Wires => "sub-arrays",
-        }
-    }
-}
-
-/// A wired skin.
-#[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Wiring {
-    /// Wiring.
-    pub way: Way,
-    /// Wires.
-    pub wires: usize,
-    /// Limit that the amplifier's closed forms show as exceeded; `None` if there is none.
-    pub limit: Option<Limit>,
-    /// Feedback resistance, Ω.
-    pub feedback_ohm: f64,
-    /// 1 + Rf·ΣG of the wire with the most taxels.
-    pub noise_gain: f64,
-    /// Settling time to half a step of the converter, including slewing, s.
-    pub settle_s: f64,
+/// One wire whose feedback is reduced until the sum of a skin fits the converter, and whose clock is slowed until the
+/// output settles.
+#[derive(Debug, Clone)]
+pub(crate) struct Fitted {
     /// Duration of a measurement, s.
-    pub period_s: f64,
-    /// Signal of a fully pressed taxel, in steps of the converter.
-    pub steps_per_taxel: f64,
-    /// Readout of every wire.
-    #[serde(skip)]
+    pub(crate) period_s: f64,
+    /// The readout.
     pub(crate) profile: Profile,
+}
+
+impl Fitted {
+    /// For a skin whose taxels have the conductances `image_s` above those of the idle skin.
+    pub(crate) fn new(image_s: &[f64], seeding: Seeding, electronics: &ElectronicsStudy) -> Result<Self, Refusal> {
+        let setting = Setting {
+            skin: pressed_skin(sums(image_s), image_s.len(), electronics),
+            adc: electronics.adc,
+            available_s: electronics.available_s()?,
+        };
+        let designed_ohm = electronics.network.feedback_ohm;
+        let taxels = image_s.len() as f64;
+        let budget = Budget::new(&amplifier(electronics, designed_ohm)?, taxels, &setting);
+        // the sum is proportional to the feedback
+        let share = (HEADROOM * budget.range_v / budget.excursion_v).min(1.0);
+        let amplifier = amplifier(electronics, designed_ohm * share)?;
+        let own = Budget::new(&amplifier, taxels, &setting);
+        let available_s = (own.settle_s + own.slew_s).max(setting.available_s);
+        let period_s = available_s + electronics.busy_s;
+        let effects = ["late_updates", "contact_noise"];
+        let table = profile(amplifier.network().feedback_ohm, 1.0 / period_s, available_s, &effects)?;
+        let profile: Profile = table.try_into().map_err(Refusal::from_error)?;
+        Ok(Self { period_s, profile: Profile { seeding: Some(seeding), ..profile } })
+    }
 }
 
 /// ΣG and ΣG² of taxels, S and S².
@@ -101,67 +80,6 @@ pub(crate) fn bisected(
         }
     }
     Ok(low)
-}
-
-/// Every way to wire a skin whose taxels have the conductances `image_s` above those of the idle skin; sub-arrays only
-/// where more than one wire is needed.
-pub(crate) fn wirings(
-    image_s: &[f64],
-    seeding: Seeding,
-    electronics: &ElectronicsStudy,
-) -> Result<Vec<Wiring>, Refusal> {
-    let taxels = u32::try_from(image_s.len()).unwrap_or(u32::MAX);
-    let setting = Setting {
-        skin: pressed_skin(sums(image_s), image_s.len(), electronics),
-        adc: electronics.adc,
-        available_s: electronics.available_s()?,
-    };
-    let designed_ohm = electronics.network.feedback_ohm;
-    let designed = amplifier(electronics, designed_ohm)?;
-    let mut ways = Vec::new();
-    for way in Way::ALL {
-        let (amplifier, wires) = match way {
-            Way::Ideal | Way::AsDesigned => (designed, 1),
-            Way::Fitted => {
-                let budget = Budget::new(&designed, f64::from(taxels), &setting);
-                // the sum is proportional to the feedback
-                let share = (HEADROOM * budget.range_v / budget.excursion_v).min(1.0);
-                (amplifier(electronics, designed_ohm * share)?, 1)
-            }
-            Way::Wires => (designed, fewest_wires(taxels, &setting, &|_| Ok(designed))?.wires),
-        };
-        if way == Way::Wires && wires == 1 {
-            continue;
-        }
-        let budget = |setting: &Setting| Budget::new(&amplifier, f64::from(taxels.div_ceil(wires)), setting);
-        let own = budget(&setting);
-        let settle_s = own.settle_s + own.slew_s;
-        let available_s = match way {
-            Way::Fitted => settle_s.max(setting.available_s),
-            _ => setting.available_s,
-        };
-        let period_s = available_s + electronics.busy_s;
-        let feedback_ohm = amplifier.network().feedback_ohm;
-        let profile = if way == Way::Ideal {
-            Profile::named("ideal")?
-        } else {
-            let table = profile(feedback_ohm, 1.0 / period_s, available_s, &["late_updates", "contact_noise"])?;
-            table.try_into().map_err(Refusal::from_error)?
-        };
-        ways.push(Wiring {
-            way,
-            wires: wires as usize,
-            limit: budget(&Setting { available_s, ..setting }).limit.filter(|_| way != Way::Ideal),
-            feedback_ohm,
-            noise_gain: own.noise_gain,
-            settle_s,
-            period_s,
-            steps_per_taxel: feedback_ohm * electronics.skin.drive_v * electronics.skin.pressed_s
-                / electronics.adc.lsb_v(),
-            profile: Profile { seeding: Some(seeding), ..profile },
-        });
-    }
-    Ok(ways)
 }
 
 /// as_designed with this feedback and clock, whose output has `available_s` of a measurement to settle. The `effects`

@@ -238,7 +238,7 @@ impl Patches {
         let pursuit = RegionPursuit { max_rounds: MAX_ROUNDS, ..RegionPursuit::new(self.rows, self.cols) };
         let mut centred = y.to_vec();
         centre_by_wire(&mut centred, wires);
-        let mut image = pursuit.recover(&Centred::by_wire(phi, wires), &centred, None)?.image;
+        let mut image = pursuit.recover(&Centred::by_wire(phi, wires), &centred)?;
         if let Some(taxels) = contact_taxels(&image, y.len()) {
             let mut columns = phi.select_columns(&taxels);
             without_means(&mut columns, wires);

@@ -1,28 +1,11 @@
-//! Linear operators: dense matrices, ±1 matrices that are not stored, and combinations of them.
-//!
-//! ```
-//! use spts_recon::operator::{LinearOperator as _, SignGenerator, SignOperator};
-//!
-//! // 20 measurements of 100 taxels with ±1 weights from a generator, of which no matrix is stored
-//! let generator = SignGenerator::new(1_664_525, 1_013_904_223, 31)?;
-//! let phi = SignOperator::new(generator, (8..108).collect(), 0, 20);
-//! let (mut image, mut y) = ([0.0; 100], [0.0; 20]);
-//! image[42] = 1.5;
-//! phi.apply(&image, &mut y);
-//! // one pressed taxel: every measurement is its pressure or the negative of it
-//! assert!(y.iter().all(|v| (v.abs() - 1.5).abs() < 1e-15));
-//! # Ok::<(), Box<dyn std::error::Error>>(())
-//! ```
+//! Linear operators: dense matrices, rows of ±1 that are stored as bits, and combinations of them.
 
 mod bits;
-mod sign;
 
 pub use bits::SignRows;
-pub use sign::{SignGenerator, SignOperator};
 
 use crate::kernels::{self, dot, norm};
 use crate::matrix::{Matrix, MatrixView};
-use rayon::prelude::*;
 
 /// A linear map from `ncols` to `nrows` numbers. Every implementation satisfies ⟨A x, y⟩ = ⟨x, Aᵀ y⟩ up to rounding.
 ///
@@ -66,18 +49,15 @@ pub trait LinearOperator {
 /// An operator from which columns can be selected.
 ///
 /// ```
-/// use spts_recon::operator::{LinearOperator as _, SelectColumns as _, SignGenerator, SignOperator};
+/// use spts_recon::operator::{LinearOperator as _, SelectColumns as _, SignRows};
 ///
-/// let generator = SignGenerator::new(1_664_525, 1_013_904_223, 31)?;
-/// let phi = SignOperator::new(generator, (8..108).collect(), 0, 20);
-/// let few = phi.select_columns(&[3, 42]);
-/// let (mut all, mut selected) = ([0.0; 20], [0.0; 20]);
-/// let mut image = [0.0; 100];
-/// (image[3], image[42]) = (1.0, 2.0);
-/// phi.apply(&image, &mut all);
+/// // the rows (+, −, +) and (−, −, +)
+/// let phi = SignRows::new(&[0b101, 0b100], 3);
+/// let few = phi.select_columns(&[0, 2]);
+/// let (mut all, mut selected) = ([0.0; 2], [0.0; 2]);
+/// phi.apply(&[1.0, 0.0, 2.0], &mut all);
 /// few.apply(&[1.0, 2.0], &mut selected);
 /// assert_eq!(all, selected);
-/// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
 pub trait SelectColumns: LinearOperator {
     /// Operator of the selected columns.
@@ -220,11 +200,6 @@ impl<A> Centred<A> {
     pub fn by_wire(inner: A, wires: &[u16]) -> Self {
         Self { inner, wires: wires.to_vec() }
     }
-
-    /// The operator without the subtraction.
-    pub fn inner(&self) -> &A {
-        &self.inner
-    }
 }
 
 /// Subtracts the mean of `y`, to match a [`Centred`] operator.
@@ -340,101 +315,6 @@ impl<A: LinearOperator, B: LinearOperator> LinearOperator for Composition<A, B> 
     }
 }
 
-/// Block-diagonal operator. Each sub-array has its own rows (a wire) and the next range of columns.
-///
-/// ```
-/// use spts_recon::operator::{LinearOperator as _, SignGenerator, SignOperator, SubArrays};
-///
-/// // 200 taxels on two wires, 20 measurements of each
-/// let generator = SignGenerator::new(1_664_525, 1_013_904_223, 31)?;
-/// let wire = |seeds| SignOperator::new(generator, seeds, 0, 20);
-/// let skin = SubArrays::new(vec![wire((8..108).collect()), wire((108..208).collect())]);
-/// assert_eq!((skin.nrows(), skin.ncols()), (40, 200));
-/// let (mut image, mut y) = ([0.0; 200], [0.0; 40]);
-/// image[150] = 1.0; // on the second wire
-/// skin.apply(&image, &mut y);
-/// assert!(y[..20].iter().all(|v| *v == 0.0) && y[20..].iter().all(|v| v.abs() == 1.0));
-/// # Ok::<(), Box<dyn std::error::Error>>(())
-/// ```
-#[derive(Debug, Clone)]
-pub struct SubArrays<A> {
-    parts: Vec<A>,
-}
-
-impl<A: LinearOperator + Sync> SubArrays<A> {
-    /// The given sub-arrays, in order of their columns.
-    pub fn new(parts: Vec<A>) -> Self {
-        Self { parts }
-    }
-
-    /// The sub-arrays.
-    pub fn parts(&self) -> &[A] {
-        &self.parts
-    }
-
-    /// Every part with its own pieces of `input` and `output`.
-    fn each(&self, input: &[f64], output: &mut [f64], of: fn(&A) -> (usize, usize), run: fn(&A, &[f64], &mut [f64])) {
-        let mut pieces = Vec::with_capacity(self.parts.len());
-        let (mut input, mut output) = (input, output);
-        for part in &self.parts {
-            let (from, to) = of(part);
-            let (piece_in, rest_in) = input.split_at(from);
-            let (piece_out, rest_out) = output.split_at_mut(to);
-            pieces.push((part, piece_in, piece_out));
-            (input, output) = (rest_in, rest_out);
-        }
-        pieces.into_par_iter().for_each(|(part, from, to)| run(part, from, to));
-    }
-}
-
-impl<A: LinearOperator + Sync> LinearOperator for SubArrays<A> {
-    fn nrows(&self) -> usize {
-        self.parts.iter().map(LinearOperator::nrows).sum()
-    }
-
-    fn ncols(&self) -> usize {
-        self.parts.iter().map(LinearOperator::ncols).sum()
-    }
-
-    fn apply(&self, x: &[f64], y: &mut [f64]) {
-        check_shape(self, x, y);
-        self.each(x, y, |part| (part.ncols(), part.nrows()), A::apply);
-    }
-
-    fn apply_adjoint(&self, y: &[f64], x: &mut [f64]) {
-        check_shape(self, x, y);
-        self.each(y, x, |part| (part.nrows(), part.ncols()), A::apply_adjoint);
-    }
-}
-
-/// The columns have to be in increasing order, so that those of a part stay together.
-impl<A: SelectColumns + Sync> SelectColumns for SubArrays<A>
-where
-    A::Selected: Sync,
-{
-    type Selected = SubArrays<A::Selected>;
-
-    fn select_columns(&self, columns: &[usize]) -> Self::Selected {
-        assert!(columns.is_sorted(), "columns of sub-arrays are taken in increasing order");
-        let (mut first, mut parts) = (0, Vec::with_capacity(self.parts.len()));
-        let mut left = columns;
-        for part in &self.parts {
-            let end = first + part.ncols();
-            let (own, rest) = left.split_at(left.partition_point(|&k| k < end));
-            let own: Vec<usize> = own.iter().map(|k| k - first).collect();
-            parts.push(part.select_columns(&own));
-            (first, left) = (end, rest);
-        }
-        assert!(left.is_empty(), "column {} of {first}", left[0]);
-        SubArrays { parts }
-    }
-
-    fn chance_variance(&self, r: &[f64], variance: &mut [f64]) {
-        check_shape(self, variance, r);
-        self.each(r, variance, |part| (part.nrows(), part.ncols()), A::chance_variance);
-    }
-}
-
 /// Numbers in (−1, 1) that are the same at every call.
 fn values(n: usize, phase: f64) -> Vec<f64> {
     (0_u32..).map(|k| (1.7 * f64::from(k) + phase).sin()).take(n).collect()
@@ -507,21 +387,5 @@ mod tests {
         let mut y = [1.0, 3.0, 5.0, 7.0, 9.0];
         centre_by_wire(&mut y, &[0, 0, 0, 0, 1]);
         assert!(y.iter().zip([-3.0, -1.0, 1.0, 3.0, 9.0]).all(|(a, b)| (a - b).abs() < 1e-15));
-    }
-
-    fn parts() -> SubArrays<Matrix> {
-        let first = Matrix::from_rows(1, 2, vec![1.0, 2.0]).unwrap();
-        let second = Matrix::from_rows(2, 1, vec![3.0, -1.0]).unwrap();
-        SubArrays::new(vec![first, second])
-    }
-
-    #[test]
-    fn it_is_block_diagonal() {
-        let a = parts();
-        check_operator(&a);
-        assert_eq!((a.nrows(), a.ncols()), (3, 3));
-        let mut y = [0.0; 3];
-        a.apply(&[1.0, 1.0, 2.0], &mut y);
-        assert_eq!(y.map(f64::to_bits), [3.0_f64, 6.0, -2.0].map(f64::to_bits));
     }
 }

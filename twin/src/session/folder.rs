@@ -137,7 +137,7 @@ fn missing_mark(converter: &Converter) -> u32 {
 
 /// Whether codes and the mark of a missing sample have 16 bits.
 fn is_narrow(converter: &Converter) -> bool {
-    converter.max_code() < u32::from(u16::MAX)
+    converter.code_bytes() == size_of::<u16>()
 }
 
 /// Array that is being written.

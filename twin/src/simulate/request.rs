@@ -4,6 +4,7 @@ use crate::chain::MAX_TOML_BYTES;
 use crate::record::header;
 use crate::scene::{Assignment, Scene, SceneConfig, Task, not_text, unwritable};
 use crate::session::Session;
+use spts_circuit::Mode;
 use spts_contact::mesh::{MAX_FILE_BYTES, MeshReport};
 use spts_input::{InputError, Refusal};
 use spts_models::REFERENCE_PA;
@@ -11,6 +12,11 @@ use spts_sim::fidelity::LEVELS;
 use spts_sim::mechanics::Mechanics;
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
+
+/// Maps of a frame in files: pressure, electrode pressure and conductance.
+const MAPS: f64 = 3.0;
+/// Bytes of a line of `frames.csv`.
+const FRAME_LINE: f64 = 230.0;
 
 /// A request to simulate: a scene by name or file, and the changes to it.
 ///
@@ -58,6 +64,23 @@ impl Prepared {
             Task::Press(press) => press.object.as_deref().unwrap_or("mesh"),
             Task::Drop(_) => "ball",
         }
+    }
+
+    /// Bytes of the files of a run, of which a few pictures are left out; with its recordings if it has them.
+    pub fn bytes(&self, record: bool) -> u64 {
+        let (scene, mechanics) = (&self.scene, self.scene.mechanics());
+        let frames = scene.duration_s() / mechanics.frame_interval_s();
+        let chain = scene.chain();
+        let samples = if record { scene.duration_s() * chain.sample_rate_hz() } else { 0.0 };
+        let code = |mode| {
+            let converter = chain.profile().converter(mode).ok().flatten();
+            converter.map_or(size_of::<f64>(), |converter| converter.code_bytes()) as f64
+        };
+        let map = MAPS * size_of::<f64>() as f64 * scene.skin().taxels() as f64;
+        let press = frames * (map + FRAME_LINE) + samples * (code(Mode::Compressive) + code(Mode::Raster));
+        #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "casts saturate")]
+        let bytes = (press * scene.repeats() as f64) as u64;
+        bytes
     }
 
     /// The session of the run, without its recordings.

@@ -2,9 +2,10 @@
 
 use crate::chunk::Chunk;
 use crate::protocol::PUBLISHED_RATE_HZ;
+use crate::training::TrainingData;
 use crate::windows::{Press, Untouched};
 use nalgebra::{DMatrix, DVector};
-use spts_circuit::Recording;
+use spts_circuit::{Block, Recording};
 use spts_recon::metrics::median;
 
 /// Frames at the start of a block that are taken to be without a touch.
@@ -105,11 +106,14 @@ pub struct RecordedBounce {
     pub start: usize,
     /// One past the last measurement in contact.
     pub end: usize,
-    /// Output with nothing on the skin, V.
-    pub idle: f64,
 }
 
 impl RecordedBounce {
+    /// The skin with nothing on it.
+    pub fn untouched(&self, recording: &Recording) -> Untouched {
+        Untouched::flat(recording, self.block)
+    }
+
     /// Duration of the contact, s.
     pub fn duration_s(&self, recording: &Recording) -> f64 {
         (self.end - self.start) as f64 / recording.sample_rate_hz()
@@ -125,25 +129,22 @@ const GAP: usize = 100;
 /// Shorter events are not contacts of a ball, measurements of the published skin (3 ms).
 const SHORTEST: usize = 200;
 
-/// Contacts of the ball in every block, detected by the moving root mean square of the output about its median.
+/// Contacts of the ball in every block, detected by the moving root mean square of the output about that of the
+/// untouched skin.
 pub fn find_bounces(recording: &Recording) -> Vec<RecordedBounce> {
-    recording
-        .blocks()
-        .iter()
-        .enumerate()
-        .flat_map(|(block, b)| contacts(block, &b.volts, recording.sample_rate_hz()))
-        .collect()
+    let of_block = |(block, samples): (usize, &Block)| {
+        let above = Untouched::flat(recording, block).without(recording, block, 0..samples.volts.len());
+        contacts(block, &above, recording.sample_rate_hz())
+    };
+    recording.blocks().iter().enumerate().flat_map(of_block).collect()
 }
 
-fn contacts(block: usize, volts: &[f64], rate_hz: f64) -> Vec<RecordedBounce> {
+/// Contacts in a block whose output, without that of the untouched skin, is `above`, V.
+fn contacts(block: usize, above: &[f64], rate_hz: f64) -> Vec<RecordedBounce> {
     #[expect(clippy::cast_possible_truncation, reason = "casts saturate")]
     let own = |measurements: usize| (measurements as f64 * rate_hz / PUBLISHED_RATE_HZ).round().max(1.0) as usize;
     let (width, gap, shortest) = (own(ENVELOPE).max(2), own(GAP), own(SHORTEST));
-    let finite: Vec<f64> = volts.iter().copied().filter(|v| v.is_finite()).collect();
-    let Some(idle) = median(&finite) else {
-        return Vec::new();
-    };
-    let square: Vec<f64> = volts.iter().map(|v| if v.is_finite() { (v - idle).powi(2) } else { 0.0 }).collect();
+    let square: Vec<f64> = above.iter().map(|v| if v.is_finite() { v.powi(2) } else { 0.0 }).collect();
     let half = width / 2;
     let mut envelope = vec![0.0; square.len()];
     let mut sum = 0.0;
@@ -163,7 +164,7 @@ fn contacts(block: usize, volts: &[f64], rate_hz: f64) -> Vec<RecordedBounce> {
     for (i, _) in envelope.iter().enumerate().filter(|(_, e)| **e > BOUNCE_THRESHOLD * quiet) {
         match found.last_mut() {
             Some(last) if i - last.end < gap => last.end = i + 1,
-            _ => found.push(RecordedBounce { block, start: i, end: i + 1, idle }),
+            _ => found.push(RecordedBounce { block, start: i, end: i + 1 }),
         }
     }
     found.retain(|b| b.end - b.start >= shortest);
@@ -171,15 +172,16 @@ fn contacts(block: usize, volts: &[f64], rate_hz: f64) -> Vec<RecordedBounce> {
 }
 
 /// Least-squares image of a whole contact: min ‖Φ x − (y − idle)‖₂ with the recording's Φ, negative values set to zero.
-/// `None` if a sample is lost, or the normal equations are singular.
+/// `None` if a sample is lost, the normal equations are singular, or the skin has too many taxels for them.
 pub fn contact_image(recording: &Recording, bounce: &RecordedBounce) -> Option<Vec<f64>> {
     let (n, m) = (recording.taxels(), bounce.end - bounce.start);
+    if n > TrainingData::MOST_TAXELS {
+        return None;
+    }
     let rows = recording.rows(bounce.block, bounce.start..bounce.end).to_vec();
     let phi = DMatrix::from_row_slice(m, n, &rows);
-    let y = DVector::from_iterator(
-        m,
-        recording.blocks()[bounce.block].volts[bounce.start..bounce.end].iter().map(|v| v - bounce.idle),
-    );
+    let untouched = bounce.untouched(recording);
+    let y = DVector::from_vec(untouched.without(recording, bounce.block, bounce.start..bounce.end));
     if y.iter().any(|v| !v.is_finite()) {
         return None;
     }

@@ -19,8 +19,8 @@ use spts::output::unwritable;
 use spts::scene::Task;
 use spts::simulate::Prepared;
 use spts_contact::Frame;
+use spts_eval::Untouched;
 use spts_eval::decode::{DecodeRequest, no_recording};
-use spts_eval::idle_mean;
 use spts_eval::in_time::{FollowedImage, followed_images};
 use spts_eval::training::TrainingData;
 use spts_input::Refusal;
@@ -106,8 +106,7 @@ impl Animation {
         };
         let pressures = timeline.instants_s.iter().map(|time_s| pressure_pa(frames, *time_s));
         let pressures: Vec<Vec<f64>> = pressures.collect();
-        let idle_v = idle_mean(recording, 0);
-        let output_v: Vec<f64> = volts.iter().map(|v| v - idle_v).collect();
+        let output_v = Untouched::flat(recording, 0).without(recording, 0, 0..volts.len());
         let shown = sample(timeline.from_s)..sample(timeline.to_s);
         let largest = |values: &mut dyn Iterator<Item = f64>| values.filter(|v| v.is_finite()).fold(0.0, f64::max);
         Ok(Self {

@@ -3,9 +3,9 @@
 use rayon::prelude::*;
 use serde::Serialize;
 use spts_circuit::Recording;
+use spts_eval::Scorer;
 use spts_eval::decoders::TrainedDecoder;
 use spts_eval::place::RecordedBounce;
-use spts_eval::{Press, Scorer};
 use spts_input::Refusal;
 use spts_recon::statistics::quantile;
 
@@ -52,7 +52,7 @@ pub(super) fn traces(
     let of_bounce = |(index, bounce): (usize, &RecordedBounce)| {
         let start = bounce.start.saturating_sub(MARGIN);
         let end = (bounce.end + MARGIN).min(recording.blocks()[bounce.block].volts.len());
-        let press = Press::within(recording, bounce.block, start..end, bounce.idle);
+        let press = bounce.untouched(recording).press(recording, bounce.block, start..end);
         let mut scorer = Scorer::new(decoder);
         let mut rows = Vec::new();
         for m in TRACKING_MEASUREMENTS {

@@ -377,7 +377,7 @@ pub struct DesignReport {
     /// Explanation of the constraint, in a sentence.
     pub binding_reason: String,
     /// Largest number of taxels on one wire with the electronics of `as_designed` and the pressed skin of `spts
-    /// circuit`, as shown by `spts circuit` and `spts explore`.
+    /// circuit`, as that command shows it.
     pub one_wire_taxels: Option<u32>,
     /// Alternative designs.
     pub alternatives: Vec<Alternative>,

@@ -245,8 +245,8 @@ fn trials(repetitions: &[&[Means]], period_s: f64) -> Vec<ReadoutTrial> {
     (0..count).map(trial).collect()
 }
 
-/// IoU from which an image counts as good: the wanted IoU of large skins in [`explore`](crate::explore).
-pub const GOOD_IOU: f64 = crate::explore::WANTED_IOU;
+/// IoU from which an image counts as good.
+pub const GOOD_IOU: f64 = 0.8;
 
 /// The clock for skins of one size, the same for all readouts.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]

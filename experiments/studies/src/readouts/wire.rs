@@ -2,7 +2,7 @@
 
 use crate::electronics::ElectronicsStudy;
 use crate::touches::{Touch, TouchWire};
-use crate::wiring::{Way, amplifier, bisected, pressed_skin, sums, wirings};
+use crate::wiring::{Fitted, amplifier, bisected, pressed_skin, sums};
 use rand_distr::{Distribution as _, StandardNormal};
 use spts_circuit::amplifier::{Budget, Setting};
 use spts_circuit::{CellCodes, CompressiveWeights, Mode, Patterns, Profile, Readout, Seeding, Span};
@@ -242,16 +242,13 @@ pub struct SkinWire {
 
 impl SkinWire {
     /// The wire of a skin. The feedback is reduced until the sums of the touch `largest_s` (conductances minus the idle
-    /// skin's, S) with random signs fit, and the clock is slowed until they settle, as in
-    /// [`explore`](crate::explore).
+    /// skin's, S) with random signs fit, and the clock is slowed until they settle.
     ///
     /// # Errors
     /// [`Refusal`] if the electronics cannot be built.
     pub fn new(layout: SkinLayout, largest_s: &[f64]) -> Result<Self, Refusal> {
         let electronics = ElectronicsStudy::as_designed()?;
-        let wirings = wirings(largest_s, Seeding::Mixed, &electronics)?;
-        let fitted = wirings.into_iter().find(|wiring| wiring.way == Way::Fitted);
-        let fitted = fitted.ok_or_else(|| no_number("amplifier", "feedback"))?;
+        let fitted = Fitted::new(largest_s, Seeding::Mixed, &electronics)?;
         Ok(Self {
             setting: Setting {
                 skin: pressed_skin(sums(largest_s), largest_s.len(), &electronics),
