@@ -1,5 +1,5 @@
-//! `spts design`: a small design from the question to the check of its promise, and what `explore` and `circuit` say of
-//! one wire beside it.
+//! `spts design`: a small design from the question to the check of its promise, and what `circuit` says of one
+//! wire beside it.
 
 use crate::command::{files, refused, spts, succeeds, words};
 use serde_json::Value;

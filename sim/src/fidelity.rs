@@ -1,8 +1,9 @@
 //! Fidelity levels of the contact: the measured cost and error of each, and the choice of one for a given tolerance.
 
-use crate::mechanics::{Mechanics, PressConfig, Task};
+use crate::mechanics::{Mechanics, Task};
+use crate::world::World;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use spts_contact::{Holder, Load, PosedMesh, TaxelBins, build_contact};
+use spts_contact::{Frame, Holder, Load, PosedMesh, TaxelBins, build_contact};
 use spts_input::Refusal;
 use spts_models::{PressureMap, SkinLayout, in_interval};
 use std::fmt;
@@ -318,20 +319,19 @@ const FINEST: usize = 24;
 const MOST_CELLS: usize = 64;
 /// Most grid squares of an elastic field.
 const MOST_SQUARES: f64 = (1_u64 << 20) as f64;
-/// What a press at rest is off by because its force follows the course without the arm's dynamics: the largest over
-/// objects, foams and forces from 1 to 100 N, with the usual rise and fall. Faster ones need the dynamics.
-const AT_REST: f64 = 0.06;
 /// What columns under the dynamics are off by in the course of the force, against a field that is solved at every step:
 /// twice the largest error of `layer_after` at its finest over the presses of the shipped table.
 const COURSE: f64 = 0.015;
 /// Share of the tolerance that a held pose may take: other presses of the scene stand a little differently.
 const MARGIN: f64 = 0.9;
 /// What is tried: shares of the scene's own force or depth, with the weights of their errors, and how far the body is
-/// moved along rows and columns, in taxels. All of a small body may be over one taxel, and then over four.
-const POSES: [(f64, f64, f64); 3] = [(1.0, 1.0, 0.0), (0.25, 0.5, 0.0), (1.0, 1.0, 0.5)];
+/// moved along rows and columns, in taxels. A small body in the middle of one taxel or of four presses them alike on
+/// every level: the last pose is off every symmetry.
+const POSES: [(f64, f64, [f64; 2]); 3] = [(1.0, 1.0, [0.0, 0.0]), (0.25, 0.5, [0.0, 0.0]), (1.0, 1.0, [0.3, 0.2])];
 
 /// Tries the levels on the contact of `scene`, a scene of columns, whose other parameters of `[contact]` are `contact`.
-/// Of those that keep to the tolerance it takes the cheapest that the scene `can_have`.
+/// Of those that keep to the tolerance it takes the cheapest that the scene `can_have`. `off_at_rest` says what a press at
+/// rest with so many cells is off by because its force follows the course without the arm's dynamics.
 ///
 /// A press is held under its force, and a ball at its deepest. The error of a level is that of the taxels' pressures
 /// there, against `layer` with the most cells that the part of the skin under the body can have, up to 24 a taxel.
@@ -343,6 +343,7 @@ pub(crate) fn choose(
     contact: &toml::Table,
     tolerance: Tolerance,
     can_have: impl Fn(&FidelityLevel, usize) -> bool,
+    off_at_rest: impl Fn(usize) -> f64,
 ) -> Result<FidelityChoice, Refusal> {
     let task = if matches!(scene.task(), Task::Drop(_)) { "drop" } else { "press" };
     let wanted = tolerance.pressure(task).unwrap_or(0.0);
@@ -371,12 +372,10 @@ pub(crate) fn choose(
             None => difference(&trial.pressures(level, cells_per_taxel)?, &finest),
         };
         tried.push((elastic, cells_per_taxel, held));
-        let course = match (level.dynamic, level.coupled) {
-            (false, _) => AT_REST,
-            (true, Some(true)) => 0.0,
-            (true, _) => COURSE,
-        };
-        let error = held.hypot(course);
+        let mut error = held.hypot(if level.coupled == Some(true) { 0.0 } else { COURSE });
+        if !level.dynamic && error <= MARGIN * wanted {
+            error = error.hypot(off_at_rest(cells_per_taxel));
+        }
         least = least.min(error);
         if (is_finest || error <= MARGIN * wanted) && can_have(level, cells_per_taxel) {
             let saves = cost(task, REFERENCE, FINEST) / cost_s_per_s;
@@ -473,13 +472,8 @@ impl<'a> Trial<'a> {
 
     /// Whether a scene of this task can have the level.
     fn takes(&self, level: &FidelityLevel) -> bool {
-        let usual = PressConfig::default();
-        let slow = match self.scene.task() {
-            Task::Press(press) => press.rise_s >= usual.rise_s && press.fall_s >= usual.fall_s,
-            Task::Drop(_) => false,
-        };
         // never the best: a half-space has no base under it
-        level.name != "half_space" && (slow || level.dynamic)
+        level.name != "half_space" && (level.dynamic || matches!(self.scene.task(), Task::Press(_)))
     }
 
     /// Most cells a taxel that the whole skin can have.
@@ -508,8 +502,8 @@ impl<'a> Trial<'a> {
         let mut held = Held::default();
         for ((out, [force_n, depth_m]), (.., moved)) in held.iter_mut().zip(self.held).zip(POSES) {
             let mut body = lowered(self.body, depth_m);
-            body.position_m[0] += moved * self.skin.pitch_m();
-            body.position_m[1] += moved * self.skin.pitch_m();
+            body.position_m[0] += moved[0] * self.skin.pitch_m();
+            body.position_m[1] += moved[1] * self.skin.pitch_m();
             let [x, y, _] = body.position_m;
             let load = Load { force_n, axis_m: [x, y], holder: Holder::Rigid, from: None };
             let [pressure, _] = if let Some(columns) = field.quasi_static() {
@@ -529,6 +523,19 @@ impl<'a> Trial<'a> {
         }
         Ok(held)
     }
+}
+
+/// How far the taxels' pressures of the first press of `at_rest` are from those of `moving`, the same press with the
+/// arm's dynamics: the root mean square over all frames, relative; infinite where either has no answer.
+pub(crate) fn off_at_rest(at_rest: &Mechanics, moving: &Mechanics) -> f64 {
+    let frames = |scene| World::repeat(scene, 0)?.frames().collect::<Result<Vec<Frame>, Refusal>>();
+    let (Ok(found), Ok(expected)) = (frames(at_rest), frames(moving)) else {
+        return f64::INFINITY;
+    };
+    let pairs = found.iter().zip(&expected).flat_map(|(a, b)| a.pressure.values().iter().zip(b.pressure.values()));
+    let [off, whole] = pairs.fold([0.0; 2], |[off, whole], (p, q)| [off + (p - q).powi(2), whole + q * q]);
+    let relative = (off / whole).sqrt();
+    if relative.is_nan() { f64::INFINITY } else { relative }
 }
 
 /// `body` at a depth below the touch.

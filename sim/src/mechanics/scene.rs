@@ -3,7 +3,7 @@
 use super::bend::BendConfig;
 use super::press::{DropConfig, PressConfig};
 use super::timestep::{LONGEST_STEP_S, SHORTEST_STEP_S, StepLimit, Timestep, impact_damping};
-use crate::fidelity::{FidelityChoice, FidelityLevel, Tolerance, change_model, choose};
+use crate::fidelity::{FidelityChoice, FidelityLevel, Tolerance, change_model, choose, off_at_rest};
 use serde::{Deserialize, Serialize};
 use spts_contact::mesh::{MeshReport, TriMesh, sphere};
 use spts_contact::{ContactField, DepthCurve, EquilibriumError, Pose, PosedMesh, PreparedMesh, build_contact};
@@ -97,7 +97,15 @@ impl MechanicsConfig {
             level.apply(&mut config.contact, cells);
             level.coupled.is_none() || Mechanics::build(config, folder, given.cloned()).is_ok()
         };
-        let choice = choose(&scene, &self.contact, tolerance, can_have)?;
+        let off = |cells: usize| {
+            let at = |model: &str| {
+                let mut config = Self { timestep_s: Some(Timestep::Auto), ..self.clone() };
+                FidelityLevel::named(model).iter().for_each(|level| level.apply(&mut config.contact, cells));
+                Mechanics::build(config, folder, given.cloned())
+            };
+            at("footprint").and_then(|rest| Ok(off_at_rest(&rest, &at("winkler")?))).unwrap_or(f64::INFINITY)
+        };
+        let choice = choose(&scene, &self.contact, tolerance, can_have, off)?;
         choice.level.apply(&mut self.contact, choice.cells_per_taxel);
         self.chosen_for_tolerance = Some(tolerance);
         let FidelityChoice { error, finest_error, saves, .. } = choice;
