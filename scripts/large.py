@@ -59,6 +59,8 @@ def spts(*arguments, folder):
 def enough(side, folder):
     """The least power of two of measurements with the wanted IoU, up to a half of the taxels; a dash for none."""
     tried = [2**k for k in range(4, 15) if 2 * 2**k <= side * side]
+    if not tried:
+        return "–"
     measurements = ",".join(map(str, tried))
     text, _, _ = spts(
         "decode", "s", "--measurements", measurements, "--decoder", "auto", "--json", "--out", "m", folder=folder

@@ -18,7 +18,7 @@ fn a_quick_study_is_complete_and_does_not_depend_on_the_threads() {
     for row in rows {
         for key in words(
             "timestep_s cost_us_per_step pressure_rms_rel taxel_rms_rel support_delta iou_delta \
-              class_delta",
+              class_delta chain_s",
         ) {
             assert!(row[key].is_f64(), "{key} in {row}");
         }

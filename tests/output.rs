@@ -30,6 +30,28 @@ fn names(dir: &Path) -> Vec<String> {
     names
 }
 
+/// What a run says that it will write is near what it writes; of a drop, whose frames are closer in contact, it is less.
+#[test]
+fn the_size_of_a_run_is_known_before() {
+    let dir = tempfile::tempdir().unwrap();
+    for (scene, presses, least) in [("press/T", 12, 0.8), ("bounce", 4, 0.1)] {
+        let faster = if scene == "press/T" { "contact.model=footprint" } else { "drop.height_m=0.1" };
+        let assignments = [format!("{}={presses}", if scene == "bounce" { "drop.drops" } else { "press.presses" })];
+        let assignments = assignments.iter().map(|a| a.parse().unwrap()).chain([faster.parse().unwrap()]).collect();
+        let prepared = spts::simulate::Request { scene: scene.to_owned(), assignments }.prepare().unwrap();
+        let said = prepared.bytes(true) as f64;
+        let arguments = format!("simulate {scene} --presses {presses} --set {faster} --out {presses}");
+        succeeds(dir.path(), &words(&arguments));
+        let results = files(&dir.path().join(presses.to_string()));
+        let pictures = |name: &str| name.ends_with(".png") || name.ends_with(".svg");
+        let written: usize = results.iter().filter(|(name, _)| !pictures(name)).map(|(_, bytes)| bytes.len()).sum();
+        let share = said / written as f64;
+        assert!((least..=1.05).contains(&share), "{scene}: {said} bytes said, {written} written");
+    }
+    let large = "simulate press/T --presses 100000 --set skin.rows=1000 --set skin.cols=1000 --contact footprint";
+    refused(dir.path(), &words(large), &["a run of 100000 presses or drops needs", "MB are free"]);
+}
+
 /// The program itself, ended by the system: killed, or by a signal, after which it clears up.
 #[test]
 fn a_run_that_is_ended_leaves_one_set() {

@@ -377,7 +377,7 @@ impl Recording {
             bail!("`measurements` = {measurements} and `count` = {count}: at least 1 is needed of both");
         }
         let samples = self.samples();
-        let untouched = Untouched { offsets_v: idle_means(samples, block), image: None };
+        let untouched = Untouched::flat(samples, block);
         let y = untouched.without(samples, block, first..first + total);
         let rows = samples.rows(block, first..first + total);
         let phi = rows.to_vec().into_pyarray(py).reshape([count, measurements, rows.taxels()])?;

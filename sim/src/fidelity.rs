@@ -1,9 +1,8 @@
 //! Fidelity levels of the contact: the measured cost and error of each, and the choice of one for a given tolerance.
 
 use crate::mechanics::{Mechanics, Task};
-use crate::world::World;
 use serde::{Deserialize, Deserializer, Serialize, Serializer};
-use spts_contact::{Frame, Holder, Load, PosedMesh, TaxelBins, build_contact};
+use spts_contact::{Holder, Load, PosedMesh, TaxelBins, build_contact};
 use spts_input::Refusal;
 use spts_models::{PressureMap, SkinLayout, in_interval};
 use std::fmt;
@@ -330,8 +329,8 @@ const MARGIN: f64 = 0.9;
 const POSES: [(f64, f64, [f64; 2]); 3] = [(1.0, 1.0, [0.0, 0.0]), (0.25, 0.5, [0.0, 0.0]), (1.0, 1.0, [0.3, 0.2])];
 
 /// Tries the levels on the contact of `scene`, a scene of columns, whose other parameters of `[contact]` are `contact`.
-/// Of those that keep to the tolerance it takes the cheapest that the scene `can_have`. `off_at_rest` says what a press at
-/// rest with so many cells is off by because its force follows the course without the arm's dynamics.
+/// Of those that keep to the tolerance it takes the cheapest that the scene `can_have`. `off_at_rest` says what a press
+/// at rest, with so many cells, is off by because its force follows the course without the arm's dynamics.
 ///
 /// A press is held under its force, and a ball at its deepest. The error of a level is that of the taxels' pressures
 /// there, against `layer` with the most cells that the part of the skin under the body can have, up to 24 a taxel.
@@ -361,6 +360,8 @@ pub(crate) fn choose(
     // a press is held by the same force on every level: two levels of one model feel the same
     let mut tried: Vec<(bool, usize, f64)> = vec![(true, trial.finest, 0.0)];
     let mut least = f64::INFINITY;
+    // the course of the force hardly depends on the cells
+    let mut rest: Option<f64> = None;
     for (cost_s_per_s, level, cells_per_taxel) in candidates {
         let elastic = level.coupled.is_some();
         let is_finest = level.name == REFERENCE && cells_per_taxel == trial.finest;
@@ -374,7 +375,7 @@ pub(crate) fn choose(
         tried.push((elastic, cells_per_taxel, held));
         let mut error = held.hypot(if level.coupled == Some(true) { 0.0 } else { COURSE });
         if !level.dynamic && error <= MARGIN * wanted {
-            error = error.hypot(off_at_rest(cells_per_taxel));
+            error = error.hypot(*rest.get_or_insert_with(|| off_at_rest(cells_per_taxel)));
         }
         least = least.min(error);
         if (is_finest || error <= MARGIN * wanted) && can_have(level, cells_per_taxel) {
@@ -523,19 +524,6 @@ impl<'a> Trial<'a> {
         }
         Ok(held)
     }
-}
-
-/// How far the taxels' pressures of the first press of `at_rest` are from those of `moving`, the same press with the
-/// arm's dynamics: the root mean square over all frames, relative; infinite where either has no answer.
-pub(crate) fn off_at_rest(at_rest: &Mechanics, moving: &Mechanics) -> f64 {
-    let frames = |scene| World::repeat(scene, 0)?.frames().collect::<Result<Vec<Frame>, Refusal>>();
-    let (Ok(found), Ok(expected)) = (frames(at_rest), frames(moving)) else {
-        return f64::INFINITY;
-    };
-    let pairs = found.iter().zip(&expected).flat_map(|(a, b)| a.pressure.values().iter().zip(b.pressure.values()));
-    let [off, whole] = pairs.fold([0.0; 2], |[off, whole], (p, q)| [off + (p - q).powi(2), whole + q * q]);
-    let relative = (off / whole).sqrt();
-    if relative.is_nan() { f64::INFINITY } else { relative }
 }
 
 /// `body` at a depth below the touch.

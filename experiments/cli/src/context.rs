@@ -85,7 +85,7 @@ pub(super) fn note_earlier(path: &Path) {
 const LARGE: u64 = 1_000_000_000;
 
 /// Refuses to write `bytes` in the folder `out` where the disk has no room for them, and says how many there will be
-/// where they are many. `what` takes them.
+/// where they are many. `what` names the run.
 pub(super) fn check_room(out: &Path, what: &str, bytes: u64) -> Result<(), Refusal> {
     let there = out.ancestors().find(|above| above.is_dir()).unwrap_or(Path::new("."));
     let mb = |bytes: u64| bytes as f64 / 1e6;
@@ -98,20 +98,10 @@ pub(super) fn check_room(out: &Path, what: &str, bytes: u64) -> Result<(), Refus
         }
     }
     if bytes > LARGE {
-        note(&format!("note: {what} takes {:.1} GB in {}", mb(bytes) / 1e3, out.display()));
+        note(&format!("note: {what} takes about {:.1} GB in {}", mb(bytes) / 1e3, out.display()));
     }
     Ok(())
 }
-
-/// How long `done` of `all` items took before a long run, as a note on what is left.
-pub(super) fn left_note(started: Instant, [done, all]: [usize; 2], items: &str) -> Option<String> {
-    let left_s = started.elapsed().as_secs_f64() * (all - done) as f64 / done.max(1) as f64;
-    let left = HumanDuration(Duration::try_from_secs_f64(left_s).unwrap_or(Duration::MAX));
-    (left_s > LONG_S).then(|| format!("note: {done} of {all} {items} are done; the others take about {left}"))
-}
-
-/// A run of which more than this is left says so, s.
-const LONG_S: f64 = 60.0;
 
 /// Standard error, or nowhere when that is not a terminal.
 fn target() -> ProgressDrawTarget {

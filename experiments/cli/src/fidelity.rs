@@ -4,6 +4,7 @@ use crate::context::{Bars, Common, note, open_folder};
 use crate::error::CliError;
 use crate::options::{Side, number, seed, sorted, square, whole};
 use clap::Args;
+use spts_input::Refusal;
 use spts_studies::fidelity::{FidelityStudy, SettingGrid};
 use spts_studies::tolerances::ToleranceStudy;
 use std::path::PathBuf;
@@ -83,9 +84,17 @@ impl FidelityCommand {
             return self.common.print(&report, || spts_report::fidelity::tolerances_text(&report));
         }
         let side = self.taxels.0;
+        let most = SettingGrid::most_cells(side);
         let mut grid = if self.quick { SettingGrid::quick() } else { SettingGrid::of(side) };
+        grid.cells_per_taxel.retain(|cells| *cells <= most);
+        grid.reference_cells = grid.reference_cells.min(most);
         if !self.cells.is_empty() {
             let cells: Vec<usize> = sorted(self.cells.iter().copied().map(usize::from).collect());
+            if let Some(cells) = cells.iter().find(|cells| **cells > most) {
+                return Err(
+                    Refusal::range("--cells", cells, format!("[1, {most}] with --taxels {}", side * side)).into()
+                );
+            }
             grid.reference_cells = grid.reference_cells.max(cells[cells.len() - 1]);
             grid.cells_per_taxel = cells;
         }

@@ -16,7 +16,6 @@ mod design;
 mod device;
 mod error;
 #[cfg(feature = "full")]
-#[cfg(feature = "full")]
 mod fidelity;
 #[cfg(feature = "full")]
 mod firmware;

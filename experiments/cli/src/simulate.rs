@@ -1,9 +1,10 @@
 //! `spts simulate`: one scene, from its name to its result files.
 
-use crate::context::{Bars, Common, TICK, check_room, left_note, note, notes, open_folder, progress, spinner};
+use crate::context::{Bars, Common, TICK, check_room, note, notes, open_folder, progress, spinner};
 use crate::error::CliError;
 use crate::options::{number, seed, whole};
 use clap::Args;
+use indicatif::HumanDuration;
 use serde::Serialize;
 use spts::Session;
 use spts::scene::{Assignment, MESH_COPY, Timestep, Tolerance};
@@ -20,7 +21,7 @@ use spts_report::animation::Animation;
 use spts_report::simulation::SimulationFiles;
 use spts_studies::fidelity::ToleranceCheck;
 use std::path::{Path, PathBuf};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 use toml::Value;
 
 /// Simulates one scene and records it through the readout: a robot arm presses an object on the skin, or a ball bounces
@@ -253,7 +254,7 @@ impl SimulateCommand {
         let out = self.out.clone();
         let out = out.unwrap_or_else(|| default_folder(&prepared));
         let presses = prepared.scene.repeats();
-        check_room(&out, &format!("the results of {presses} presses or drops"), prepared.bytes(!self.no_record))?;
+        check_room(&out, &format!("a run of {presses} presses or drops"), prepared.bytes(!self.no_record))?;
         let folder = open_folder(&out)?;
         let mut files = SimulationFiles::create(folder, &prepared, !self.no_record)?;
         let bar = progress(presses, "simulating");
@@ -269,14 +270,13 @@ impl SimulateCommand {
         let started = Instant::now();
         let simulate = || {
             run(&prepared, !self.no_record, &done, |piece| {
-                if piece.first == 0 {
-                    let left = left_note(started, [piece.presses.len(), piece.of], "presses or drops");
-                    left.iter().for_each(|left| bar.suspend(|| note(left)));
-                }
                 if self.animate && piece.first == 0 {
                     first.extend(piece.presses.iter().take(1).flat_map(|press| press.frames.clone()));
                 }
-                files.push(&piece)
+                files.push(&piece)?;
+                let left = time_left(started.elapsed(), piece.first + piece.presses.len(), piece.of);
+                left.iter().filter(|_| piece.first == 0).for_each(|left| bar.suspend(|| note(left)));
+                Ok(())
             })
         };
         let layout = prepared.scene.skin();
@@ -311,6 +311,18 @@ impl SimulateCommand {
         let text = || format!("{}\n{}: {}{checked}", summary.table(), out.display(), names.join(", "));
         self.common.print(&Printed { summary: &summary, check: check.as_ref() }, text)
     }
+}
+
+/// A run of which more than this is left says so.
+const LONG: Duration = Duration::from_secs(60);
+
+/// A note on the time that is left of a long run, of which `done` of `all` presses took `elapsed`.
+fn time_left(elapsed: Duration, done: usize, all: usize) -> Option<String> {
+    let left_s = elapsed.as_secs_f64() * all.saturating_sub(done) as f64 / done.max(1) as f64;
+    let left = Duration::try_from_secs_f64(left_s).unwrap_or(Duration::MAX);
+    (left > LONG).then(|| {
+        format!("note: {done} of {all} presses or drops are done; the others take about {}", HumanDuration(left))
+    })
 }
 
 /// What `--json` prints.
@@ -423,6 +435,15 @@ fn default_folder(prepared: &Prepared) -> PathBuf {
 mod tests {
     use super::*;
     use spts::simulate::NAMED_SCENES;
+
+    #[test]
+    fn long_runs_say_what_is_left() {
+        let of = |seconds: u64, done: usize, all: usize| time_left(Duration::from_secs(seconds), done, all);
+        assert_eq!(of(2, 4, 100), None);
+        assert_eq!(of(600, 4, 4), None);
+        let said = "note: 4 of 100 presses or drops are done; the others take about 4 minutes";
+        assert_eq!(of(10, 4, 100).as_deref(), Some(said));
+    }
 
     /// Every scene that ships is listed, and what is listed can be simulated.
     #[test]

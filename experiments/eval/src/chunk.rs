@@ -56,12 +56,13 @@ impl<'a> Chunk<'a> {
         let volts = &recording.blocks()[block].volts[start..start + len];
         let lost: Vec<bool> = volts.iter().map(|v| !v.is_finite()).collect();
         let rows = recording.rows(block, start..start + len);
-        let mean = |wire: usize| {
-            let own = volts.iter().enumerate().filter(|(k, v)| v.is_finite() && rows.wire(*k) == wire);
-            let (sum, count) = own.fold((0.0, 0_usize), |(sum, count), (_, v)| (sum + v, count + 1));
-            sum / count.max(1) as f64
-        };
-        let means_v: Vec<f64> = (0..compressive_wires(recording)).map(mean).collect();
+        let mut sums = vec![(0.0, 0_usize); compressive_wires(recording)];
+        for (k, v) in volts.iter().enumerate().filter(|(_, v)| v.is_finite()) {
+            let (sum, count) = &mut sums[rows.wire(k)];
+            *sum += v;
+            *count += 1;
+        }
+        let means_v: Vec<f64> = sums.iter().map(|(sum, count)| sum / (*count).max(1) as f64).collect();
         let above = |(k, v): (usize, &f64)| if v.is_finite() { v - means_v[rows.wire(k)] } else { 0.0 };
         let y: Vec<f64> = volts.iter().enumerate().map(above).collect();
         Self {
@@ -112,7 +113,7 @@ impl<'a> Chunk<'a> {
         if scale > 0.0 { both.max(0.0).powi(2) / scale } else { 0.0 }
     }
 
-    /// Least squares for an image and a constant, by conjugate gradients, if the chunk lags by `rows`; `None` before
+    /// Least squares for an image and a constant for every wire, by conjugate gradients, if the chunk lags by `rows`; `None` before
     /// the first row of all or without output.
     pub(crate) fn fit(&self, rows: i64) -> Option<Fit> {
         let (taxels, wires) = (self.recording.taxels(), compressive_wires(self.recording));

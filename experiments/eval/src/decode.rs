@@ -165,7 +165,7 @@ impl DecodeRequest {
             let trained = shapes.and_then(|shapes| (spec.train)(shapes.as_ref().unwrap_or(&named)));
             trained.map_err(|e| untrained(spec.name, e))
         });
-        // of a single class every image is
+        // with one class there is nothing to decide
         let several = training.library.labels().windows(2).any(|pair| pair[0] != pair[1]);
         let classes = classes.filter(|_| several);
         Ok(LearnedDecoders {

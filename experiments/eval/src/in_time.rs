@@ -358,13 +358,13 @@ fn drop(recording: &Recording, bounce: &RecordedBounce, cols: usize) -> Option<F
             centre: Some(centre),
         })
     });
-    let untouched = bounce.untouched(recording);
+    let untouched = &bounce.untouched;
     Some(FollowedContact {
         moments: moments.collect(),
         press: untouched.press(recording, bounce.block, first..bounce.end),
         touch: bounce.start - first,
         rate_hz,
-        idle_noise_v: idle_noise(recording, bounce.block, &untouched, bounce.start),
+        idle_noise_v: idle_noise(recording, bounce.block, untouched, bounce.start),
     })
 }
 

@@ -309,7 +309,7 @@ const EXPLAINED: f64 = 0.5;
 /// Measurements that an image is estimated from, at most, for every taxel.
 const MEASUREMENTS_PER_TAXEL: usize = 100;
 /// Weights of these measurements at most: 1 GiB.
-const MOST_WEIGHTS: usize = 1 << 27;
+pub(crate) const MOST_WEIGHTS: usize = 1 << 27;
 /// Measurements that it needs at least, for every taxel.
 const LEAST_PER_TAXEL: usize = 4;
 
@@ -324,7 +324,8 @@ pub struct Untouched {
 }
 
 impl Untouched {
-    /// The untouched skin of block `block`, from its idle frames: [`idle_mean`] for a flat skin.
+    /// The untouched skin of block `block`, from its idle frames: [`idle_means`] for a flat skin. A preload takes four idle
+    /// measurements a taxel, and at most 5,792 taxels.
     pub fn of(recording: &Recording, block: usize) -> Self {
         let frames = recording.blocks()[block].idle_frames.unwrap_or(0);
         Self::in_frames(recording, block, frames)

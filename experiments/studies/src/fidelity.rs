@@ -15,7 +15,7 @@ use spts_contact::Frame;
 use spts_contact::mesh::{TriMesh, cylinder, extrude, sphere};
 use spts_eval::decoders::{TrainedDecoder, published};
 use spts_eval::training::Learned;
-use spts_eval::{Press, Scorer, Tally, Window};
+use spts_eval::{Scorer, Tally, Untouched, Window};
 use spts_input::Refusal;
 use spts_models::{SkinLayout, Streams};
 use spts_recon::Matrix;
@@ -220,7 +220,7 @@ struct ContactSetting {
 }
 
 /// Taxels along a side of the published skin.
-pub const PUBLISHED_SIDE: usize = 10;
+const PUBLISHED_SIDE: usize = 10;
 /// Squares along a side of the finest grid of other skins.
 const MOST_SQUARES_A_SIDE: usize = 384;
 
@@ -238,17 +238,23 @@ impl SettingGrid {
         }
     }
 
-    /// The settings of a skin of `side` × `side` taxels: that of the shipped table for the published one; for others
-    /// squares down to a part of them that can be solved, at the default steps.
+    /// The settings of a skin of `side` × `side` taxels: those of the shipped table for the published one; for others
+    /// as many squares a taxel as keep the grid within 384 a side, at the default steps.
     pub fn of(side: usize) -> Self {
         let full = Self::full();
         if side == PUBLISHED_SIDE {
             return full;
         }
-        let reference_cells = (MOST_SQUARES_A_SIDE / side.max(1)).clamp(1, full.reference_cells);
+        let reference_cells = Self::most_cells(side);
         let mut cells = full.cells_per_taxel;
         cells.retain(|cells| *cells <= reference_cells);
         Self { cells_per_taxel: cells, press_steps_s: vec![5e-4], drop_steps_s: vec![1e-4], reference_cells }
+    }
+
+    /// Most squares along one side of a taxel on a skin of `side` × `side`.
+    pub fn most_cells(side: usize) -> usize {
+        let most = Self::full().reference_cells;
+        if side == PUBLISHED_SIDE { most } else { (MOST_SQUARES_A_SIDE / side.max(1)).clamp(1, most) }
     }
 
     /// Settings that take less than a minute.
@@ -706,8 +712,15 @@ impl ReferenceScores {
         let [start, end] = truth.run.span_s.map(index);
         let first_s = truth.run.frames.iter().find(|f| f.wrench.force_n[2] > 0.0);
         let quiet = index(IDLE * first_s.map_or(scene.duration_s(), |f| f.time_s));
-        let idle = volts[..quiet].iter().sum::<f64>() / quiet.max(1) as f64;
-        let press = Press::within(&recording, 0, start..end, idle);
+        let mut idle = vec![(0.0, 0_usize); recording.weights().wire_count()];
+        let rows = recording.rows(0, 0..quiet);
+        for (k, v) in volts[..quiet].iter().enumerate() {
+            let (sum, count) = &mut idle[rows.wire(k)];
+            *sum += v;
+            *count += 1;
+        }
+        let offsets_v = idle.iter().map(|(sum, count)| sum / (*count).max(1) as f64).collect();
+        let press = Untouched { offsets_v, image: None }.press(&recording, 0, start..end);
         // at least 20 windows
         let most = (press.len() / 20).max(1);
         let measurements = (scene.skin().taxels() / TAXELS_PER_MEASUREMENT).clamp(1, most);
@@ -912,6 +925,14 @@ mod tests {
         assert_eq!(grid.settings(false).len(), 4 * 5 * 4 + 5 - 1);
         assert_eq!(grid.settings(true).len(), 4 * 5 * 3 - 1);
         assert!(grid.settings(true).iter().all(|s| s.level.dynamic));
+    }
+
+    /// 32 · 12 = 384 and 128 · 3 = 384 squares.
+    #[test]
+    fn larger_skins_have_fewer_squares_a_taxel() {
+        assert_eq!(SettingGrid::of(10), SettingGrid::full());
+        let of = |side| (SettingGrid::of(side).cells_per_taxel, SettingGrid::of(side).reference_cells);
+        assert_eq!((of(32), of(128)), ((vec![2, 3, 6, 12], 12), (vec![2, 3], 3)));
     }
 
     /// Two cells against four of half the size: the values 1 and 3 against 1, 2, 3, 4 leave errors 0, −1, 0, −1.

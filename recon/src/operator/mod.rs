@@ -170,14 +170,14 @@ impl SelectColumns for MatrixView<'_> {
 ///
 /// ```
 /// use spts_recon::Matrix;
-/// use spts_recon::operator::{Centred, LinearOperator as _, centre};
+/// use spts_recon::operator::{Centred, LinearOperator as _, centre_by_wire};
 ///
 /// let a = Matrix::from_rows(3, 2, vec![1.0, 1.0, 1.0, -1.0, -1.0, 1.0])?;
 /// let (x, mut y, mut expected) = ([2.0, 1.0], [0.0; 3], [0.0; 3]);
 /// a.apply(&x, &mut y);
 /// y.iter_mut().for_each(|y| *y += 0.7); // an unknown offset
-/// centre(&mut y);
-/// Centred::new(a).apply(&x, &mut expected);
+/// centre_by_wire(&mut y, &[]);
+/// Centred::by_wire(a, &[]).apply(&x, &mut expected);
 /// assert!(y.iter().zip(&expected).all(|(a, b)| (a - b).abs() < 1e-12));
 /// # Ok::<(), Box<dyn std::error::Error>>(())
 /// ```
@@ -191,19 +191,15 @@ pub struct Centred<A> {
 }
 
 impl<A> Centred<A> {
-    /// The operator that applies `inner`, and subtracts from every measurement the mean of all measurements.
-    pub fn new(inner: A) -> Self {
-        Self { inner, wires: Vec::new() }
-    }
-
-    /// The same with a mean for each wire; `wires` has the wire of every measurement, or nothing for one wire.
+    /// The operator that applies `inner`, and subtracts from every measurement the mean of its wire; `wires` has the
+    /// wire of every measurement, or nothing for one wire.
     pub fn by_wire(inner: A, wires: &[u16]) -> Self {
         Self { inner, wires: wires.to_vec() }
     }
 }
 
-/// Subtracts the mean of `y`, to match a [`Centred`] operator.
-pub fn centre(y: &mut [f64]) {
+/// Subtracts the mean of `y`.
+fn centre(y: &mut [f64]) {
     let mean = y.iter().sum::<f64>() / y.len().max(1) as f64;
     y.iter_mut().for_each(|v| *v -= mean);
 }
@@ -370,7 +366,7 @@ mod tests {
     #[test]
     fn a_constant_makes_no_difference() {
         let a = Matrix::from_rows(3, 2, vec![1.0, 2.0, -1.0, 0.5, 0.0, 3.0]).unwrap();
-        let centred = Centred::new(&a);
+        let centred = Centred::by_wire(&a, &[]);
         check_operator(&centred);
         let (mut y, mut with) = ([0.0; 3], [0.0; 3]);
         centred.apply(&[2.0, -1.0], &mut y);

@@ -3,7 +3,9 @@
 use super::bend::BendConfig;
 use super::press::{DropConfig, PressConfig};
 use super::timestep::{LONGEST_STEP_S, SHORTEST_STEP_S, StepLimit, Timestep, impact_damping};
-use crate::fidelity::{FidelityChoice, FidelityLevel, Tolerance, change_model, choose, off_at_rest};
+use crate::fidelity::{FidelityChoice, FidelityLevel, Tolerance, change_model, choose};
+#[cfg(feature = "engine")]
+use crate::world::off_at_rest;
 use serde::{Deserialize, Serialize};
 use spts_contact::mesh::{MeshReport, TriMesh, sphere};
 use spts_contact::{ContactField, DepthCurve, EquilibriumError, Pose, PosedMesh, PreparedMesh, build_contact};
@@ -97,13 +99,18 @@ impl MechanicsConfig {
             level.apply(&mut config.contact, cells);
             level.coupled.is_none() || Mechanics::build(config, folder, given.cloned()).is_ok()
         };
+        // without the engine there is no course to compare with
+        #[cfg(not(feature = "engine"))]
+        let off = |_: usize| f64::INFINITY;
+        #[cfg(feature = "engine")]
         let off = |cells: usize| {
             let at = |model: &str| {
                 let mut config = Self { timestep_s: Some(Timestep::Auto), ..self.clone() };
                 FidelityLevel::named(model).iter().for_each(|level| level.apply(&mut config.contact, cells));
                 Mechanics::build(config, folder, given.cloned())
             };
-            at("footprint").and_then(|rest| Ok(off_at_rest(&rest, &at("winkler")?))).unwrap_or(f64::INFINITY)
+            let both = at("footprint").and_then(|rest| Ok((rest, at("winkler")?)));
+            both.and_then(|(rest, moving)| off_at_rest(&rest, &moving)).unwrap_or(f64::INFINITY)
         };
         let choice = choose(&scene, &self.contact, tolerance, can_have, off)?;
         choice.level.apply(&mut self.contact, choice.cells_per_taxel);

@@ -6,6 +6,24 @@ mod dynamics;
 pub(crate) mod model;
 mod press;
 mod quasi_static;
+/// How far the taxels' pressures of the first press of `at_rest` are from those of `moving`, the same press with the
+/// arm's dynamics: the root mean square over all frames, relative to that of `moving`.
+///
+/// # Errors
+/// [`Refusal`] if either cannot be run.
+pub(crate) fn off_at_rest(at_rest: &Mechanics, moving: &Mechanics) -> Result<f64, Refusal> {
+    let (mut at_rest, mut moving) = (World::repeat(at_rest, 0)?, World::repeat(moving, 0)?);
+    let (mut off, mut whole) = (0.0, 0.0);
+    for (found, expected) in at_rest.frames().zip(moving.frames()) {
+        let (found, expected) = (found?, expected?);
+        for (p, q) in found.pressure.values().iter().zip(expected.pressure.values()) {
+            off += (p - q).powi(2);
+            whole += q * q;
+        }
+    }
+    Ok(if whole > 0.0 { (off / whole).sqrt() } else { f64::INFINITY })
+}
+
 #[cfg(test)]
 mod tests;
 

@@ -15,6 +15,8 @@ use toml::{Table, Value};
 
 /// Maps of a frame in files: pressure, electrode pressure and conductance.
 const MAPS: f64 = 3.0;
+/// Time between the frames of a drop while the ball is away from the skin, s.
+const FLIGHT_INTERVAL_S: f64 = 2e-3;
 /// Bytes of a line of `frames.csv`.
 const FRAME_LINE: f64 = 230.0;
 
@@ -66,18 +68,24 @@ impl Prepared {
         }
     }
 
-    /// Bytes of the files of a run, of which a few pictures are left out; with its recordings if it has them.
+    /// Bytes of the files of a run without its few pictures, with its recordings if it has them. Of a drop they are the
+    /// least: frames are closer than in flight while the ball touches.
     pub fn bytes(&self, record: bool) -> u64 {
         let (scene, mechanics) = (&self.scene, self.scene.mechanics());
-        let frames = scene.duration_s() / mechanics.frame_interval_s();
         let chain = scene.chain();
+        let between_s = match scene.task() {
+            Task::Press(_) => mechanics.frame_interval_s(),
+            Task::Drop(_) => mechanics.frame_interval_s().max(FLIGHT_INTERVAL_S),
+        };
+        let frames = scene.duration_s() / between_s;
         let samples = if record { scene.duration_s() * chain.sample_rate_hz() } else { 0.0 };
         let code = |mode| {
             let converter = chain.profile().converter(mode).ok().flatten();
             converter.map_or(size_of::<f64>(), |converter| converter.code_bytes()) as f64
         };
         let map = MAPS * size_of::<f64>() as f64 * scene.skin().taxels() as f64;
-        let press = frames * (map + FRAME_LINE) + samples * (code(Mode::Compressive) + code(Mode::Raster));
+        let modes = [Mode::Compressive, Mode::Raster].into_iter().filter(|mode| chain.check(*mode).is_ok());
+        let press = frames * (map + FRAME_LINE) + samples * modes.map(code).sum::<f64>();
         #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "casts saturate")]
         let bytes = (press * scene.repeats() as f64) as u64;
         bytes

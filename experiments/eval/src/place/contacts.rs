@@ -3,10 +3,11 @@
 use crate::chunk::Chunk;
 use crate::protocol::PUBLISHED_RATE_HZ;
 use crate::training::TrainingData;
-use crate::windows::{Press, Untouched};
+use crate::windows::{MOST_WEIGHTS, Press, Untouched};
 use nalgebra::{DMatrix, DVector};
 use spts_circuit::{Block, Recording};
 use spts_recon::metrics::median;
+use std::ops::Range;
 
 /// Frames at the start of a block that are taken to be without a touch.
 const QUIET_FRAMES: usize = 20;
@@ -73,9 +74,12 @@ fn levels(recording: &Recording, block: usize, untouched: &Untouched) -> Vec<f64
 }
 
 impl RecordedTouch {
-    /// The least-squares image of the whole touch minus the untouched skin, V.
+    /// The least-squares image of the whole touch, or of the middle of a long one on a large skin, minus the untouched
+    /// skin, V.
     pub fn image(&self, recording: &Recording) -> Option<Vec<f64>> {
-        let mut image = Chunk::new(recording, self.block, self.start, self.end - self.start).fit(0)?.image;
+        let len = (self.end - self.start).min(MOST_WEIGHTS / recording.taxels());
+        let start = (self.start + self.end - len) / 2;
+        let mut image = Chunk::new(recording, self.block, start, len).fit(0)?.image;
         for (volts, idle) in image.iter_mut().zip(self.untouched.image.iter().flatten()) {
             *volts -= idle;
         }
@@ -98,7 +102,7 @@ impl RecordedTouch {
 }
 
 /// One contact of the ball: measurements `start..end` of a block.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct RecordedBounce {
     /// Block of the recording.
     pub block: usize,
@@ -106,14 +110,11 @@ pub struct RecordedBounce {
     pub start: usize,
     /// One past the last measurement in contact.
     pub end: usize,
+    /// The skin with nothing on it.
+    pub untouched: Untouched,
 }
 
 impl RecordedBounce {
-    /// The skin with nothing on it.
-    pub fn untouched(&self, recording: &Recording) -> Untouched {
-        Untouched::flat(recording, self.block)
-    }
-
     /// Duration of the contact, s.
     pub fn duration_s(&self, recording: &Recording) -> f64 {
         (self.end - self.start) as f64 / recording.sample_rate_hz()
@@ -133,14 +134,16 @@ const SHORTEST: usize = 200;
 /// untouched skin.
 pub fn find_bounces(recording: &Recording) -> Vec<RecordedBounce> {
     let of_block = |(block, samples): (usize, &Block)| {
-        let above = Untouched::flat(recording, block).without(recording, block, 0..samples.volts.len());
-        contacts(block, &above, recording.sample_rate_hz())
+        let untouched = Untouched::flat(recording, block);
+        let above = untouched.without(recording, block, 0..samples.volts.len());
+        let of = move |Range { start, end }| RecordedBounce { block, start, end, untouched: untouched.clone() };
+        contacts(&above, recording.sample_rate_hz()).into_iter().map(of)
     };
     recording.blocks().iter().enumerate().flat_map(of_block).collect()
 }
 
-/// Contacts in a block whose output, without that of the untouched skin, is `above`, V.
-fn contacts(block: usize, above: &[f64], rate_hz: f64) -> Vec<RecordedBounce> {
+/// Contacts in a block whose output, without that of the untouched skin, is `above`, V: ranges of measurements.
+fn contacts(above: &[f64], rate_hz: f64) -> Vec<Range<usize>> {
     #[expect(clippy::cast_possible_truncation, reason = "casts saturate")]
     let own = |measurements: usize| (measurements as f64 * rate_hz / PUBLISHED_RATE_HZ).round().max(1.0) as usize;
     let (width, gap, shortest) = (own(ENVELOPE).max(2), own(GAP), own(SHORTEST));
@@ -160,11 +163,11 @@ fn contacts(block: usize, above: &[f64], rate_hz: f64) -> Vec<RecordedBounce> {
     let Some(quiet) = median(&envelope) else {
         return Vec::new();
     };
-    let mut found: Vec<RecordedBounce> = Vec::new();
+    let mut found: Vec<Range<usize>> = Vec::new();
     for (i, _) in envelope.iter().enumerate().filter(|(_, e)| **e > BOUNCE_THRESHOLD * quiet) {
         match found.last_mut() {
             Some(last) if i - last.end < gap => last.end = i + 1,
-            _ => found.push(RecordedBounce { block, start: i, end: i + 1 }),
+            _ => found.push(i..i + 1),
         }
     }
     found.retain(|b| b.end - b.start >= shortest);
@@ -180,8 +183,7 @@ pub fn contact_image(recording: &Recording, bounce: &RecordedBounce) -> Option<V
     }
     let rows = recording.rows(bounce.block, bounce.start..bounce.end).to_vec();
     let phi = DMatrix::from_row_slice(m, n, &rows);
-    let untouched = bounce.untouched(recording);
-    let y = DVector::from_vec(untouched.without(recording, bounce.block, bounce.start..bounce.end));
+    let y = DVector::from_vec(bounce.untouched.without(recording, bounce.block, bounce.start..bounce.end));
     if y.iter().any(|v| !v.is_finite()) {
         return None;
     }

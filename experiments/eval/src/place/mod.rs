@@ -235,7 +235,7 @@ impl Contact {
     /// `None` when a sample is lost or the contact has no image.
     fn new(recording: &Recording, bounce: &RecordedBounce, shape: [usize; 2]) -> Option<Self> {
         let centre = centre_of_mass(&contact_image(recording, bounce)?, shape[1], SUPPORT_THRESHOLD)?;
-        let press = bounce.untouched(recording).press(recording, bounce.block, bounce.start..bounce.end);
+        let press = bounce.untouched.press(recording, bounce.block, bounce.start..bounce.end);
         Some(Self { shape, centre, press })
     }
 

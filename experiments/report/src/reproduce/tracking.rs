@@ -52,7 +52,7 @@ pub(super) fn traces(
     let of_bounce = |(index, bounce): (usize, &RecordedBounce)| {
         let start = bounce.start.saturating_sub(MARGIN);
         let end = (bounce.end + MARGIN).min(recording.blocks()[bounce.block].volts.len());
-        let press = bounce.untouched(recording).press(recording, bounce.block, start..end);
+        let press = bounce.untouched.press(recording, bounce.block, start..end);
         let mut scorer = Scorer::new(decoder);
         let mut rows = Vec::new();
         for m in TRACKING_MEASUREMENTS {
