@@ -823,18 +823,24 @@ fn a_write_that_fails_half_way_damages_nothing() {
 fn a_full_disk_is_named_and_nothing_half_written_stays() {
     const CANNOT_MOUNT: i32 = 77;
     let dir = tempfile::tempdir().unwrap();
-    let script = "mount -t tmpfs -o size=256k none \"$1\" || exit 77; \"$0\" simulate press/T --out \"$1/o\"; s=$?; \
-                  ls -A \"$1\"; exit $s";
-    let mut command = Command::new("unshare");
-    match command.args(["-rm", "sh", "-c", script, SPTS]).arg(dir.path()).output() {
-        Ok(output) if output.status.code() == Some(REFUSED) => {
-            assert_refused(&output, "a full disk", &["cannot be written", "No space left"]);
+    // what is known before, and what is not
+    for (size, arguments, facts) in [
+        ("256k", "simulate press/T", ["a run of 1 presses or drops needs 3 MB", "MB are free"]),
+        ("16k", "circuit --taxels 100", ["cannot be written", "No space left"]),
+    ] {
+        let script = format!(
+            "mount -t tmpfs -o size={size} none \"$1\" || exit 77; \"$0\" {arguments} --out \"$1/o\"; s=$?; ls -A \"$1\"; \
+             exit $s"
+        );
+        let mut command = Command::new("unshare");
+        match command.args(["-rm", "sh", "-c", &script, SPTS]).arg(dir.path()).output() {
+            Ok(output) if output.status.code() == Some(REFUSED) => assert_refused(&output, arguments, &facts),
+            Ok(output) if output.status.success() => panic!("a full disk went unnoticed: {arguments}"),
+            Ok(output) if output.status.code() != Some(CANNOT_MOUNT) && !output.stdout.is_empty() => {
+                panic!("{}", String::from_utf8_lossy(&output.stderr))
+            }
+            _ => eprintln!("skipped: no file system can be mounted here"),
         }
-        Ok(output) if output.status.success() => panic!("a full disk went unnoticed"),
-        Ok(output) if output.status.code() != Some(CANNOT_MOUNT) && !output.stdout.is_empty() => {
-            panic!("{}", String::from_utf8_lossy(&output.stderr))
-        }
-        _ => eprintln!("skipped: no file system can be mounted here"),
     }
 }
 

@@ -30,7 +30,8 @@ fn names(dir: &Path) -> Vec<String> {
     names
 }
 
-/// What a run says that it will write is near what it writes; of a drop, whose frames are closer in contact, it is less.
+/// What a run says that it will write is near what it writes; of a drop, whose frames are closer in contact, it is
+/// less.
 #[test]
 fn the_size_of_a_run_is_known_before() {
     let dir = tempfile::tempdir().unwrap();

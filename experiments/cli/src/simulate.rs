@@ -254,8 +254,8 @@ impl SimulateCommand {
         let out = self.out.clone();
         let out = out.unwrap_or_else(|| default_folder(&prepared));
         let presses = prepared.scene.repeats();
-        check_room(&out, &format!("a run of {presses} presses or drops"), prepared.bytes(!self.no_record))?;
         let folder = open_folder(&out)?;
+        check_room(&out, &format!("a run of {presses} presses or drops"), prepared.bytes(!self.no_record))?;
         let mut files = SimulationFiles::create(folder, &prepared, !self.no_record)?;
         let bar = progress(presses, "simulating");
         let done = || {

@@ -113,8 +113,8 @@ impl<'a> Chunk<'a> {
         if scale > 0.0 { both.max(0.0).powi(2) / scale } else { 0.0 }
     }
 
-    /// Least squares for an image and a constant for every wire, by conjugate gradients, if the chunk lags by `rows`; `None` before
-    /// the first row of all or without output.
+    /// Least squares for an image and a constant for every wire, by conjugate gradients, if the chunk lags by `rows`;
+    /// `None` before the first row of all or without output.
     pub(crate) fn fit(&self, rows: i64) -> Option<Fit> {
         let (taxels, wires) = (self.recording.taxels(), compressive_wires(self.recording));
         let rows_of = self.rows(rows, 0)?;

@@ -324,8 +324,8 @@ pub struct Untouched {
 }
 
 impl Untouched {
-    /// The untouched skin of block `block`, from its idle frames: [`idle_means`] for a flat skin. A preload takes four idle
-    /// measurements a taxel, and at most 5,792 taxels.
+    /// The untouched skin of block `block`, from its idle frames: [`idle_means`] for a flat skin. A preload takes four
+    /// idle measurements a taxel, and at most 5,792 taxels.
     pub fn of(recording: &Recording, block: usize) -> Self {
         let frames = recording.blocks()[block].idle_frames.unwrap_or(0);
         Self::in_frames(recording, block, frames)

@@ -607,8 +607,8 @@ mod tests {
     /// support's threshold of 0.23.
     const PLACES: [(usize, usize, f64); 4] = [(5, 50, 1.0), (20, 9, 0.85), (40, 30, 0.9), (59, 0, 0.8)];
 
-    /// Four contacts, 3600 taxels, 8 % of them measured with 5 % noise: far above what 16 unknowns need. The bound on the
-    /// mean over draws of rows and noise is the IoU that large skins are asked for.
+    /// Four contacts, 3600 taxels, 8 % of them measured with 5 % noise: far above what 16 unknowns need. The bound on
+    /// the mean over draws of rows and noise is the IoU that large skins are asked for.
     #[test]
     fn contacts_are_found_on_one_wire_and_on_several() {
         const DRAWS: usize = 8;

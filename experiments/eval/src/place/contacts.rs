@@ -2,7 +2,6 @@
 
 use crate::chunk::Chunk;
 use crate::protocol::PUBLISHED_RATE_HZ;
-use crate::training::TrainingData;
 use crate::windows::{MOST_WEIGHTS, Press, Untouched};
 use nalgebra::{DMatrix, DVector};
 use spts_circuit::{Block, Recording};
@@ -175,10 +174,11 @@ fn contacts(above: &[f64], rate_hz: f64) -> Vec<Range<usize>> {
 }
 
 /// Least-squares image of a whole contact: min ‖Φ x − (y − idle)‖₂ with the recording's Φ, negative values set to zero.
-/// `None` if a sample is lost, the normal equations are singular, or the skin has too many taxels for them.
+/// `None` if a sample is lost, the normal equations are singular, or they would take more than 1 GiB.
 pub fn contact_image(recording: &Recording, bounce: &RecordedBounce) -> Option<Vec<f64>> {
     let (n, m) = (recording.taxels(), bounce.end - bounce.start);
-    if n > TrainingData::MOST_TAXELS {
+    // fewer measurements than taxels are singular
+    if m < n || m.saturating_mul(n) > MOST_WEIGHTS {
         return None;
     }
     let rows = recording.rows(bounce.block, bounce.start..bounce.end).to_vec();
