@@ -825,7 +825,7 @@ fn a_full_disk_is_named_and_nothing_half_written_stays() {
     let dir = tempfile::tempdir().unwrap();
     // what is known before, and what is not
     for (size, arguments, facts) in [
-        ("256k", "simulate press/T", ["a run of 1 presses or drops needs 3 MB", "MB are free"]),
+        ("256k", "simulate press/T", ["a run of 1 presses or drops needs 2 MB", "MB are free"]),
         ("16k", "circuit --taxels 100", ["cannot be written", "No space left"]),
     ] {
         let script = format!(

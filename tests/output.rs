@@ -49,7 +49,7 @@ fn the_size_of_a_run_is_known_before() {
         let share = said / written as f64;
         assert!((least..=1.05).contains(&share), "{scene}: {said} bytes said, {written} written");
     }
-    let large = "simulate press/T --presses 100000 --set skin.rows=1000 --set skin.cols=1000 --contact footprint";
+    let large = "simulate press/T --presses 100000 --set skin.rows=400 --set skin.cols=400 --contact footprint";
     refused(dir.path(), &words(large), &["a run of 100000 presses or drops needs", "MB are free"]);
 }
 

@@ -318,9 +318,19 @@ const FINEST: usize = 24;
 const MOST_CELLS: usize = 64;
 /// Most grid squares of an elastic field.
 const MOST_SQUARES: f64 = (1_u64 << 20) as f64;
-/// What columns under the dynamics are off by in the course of the force, against a field that is solved at every step:
-/// twice the largest error of `layer_after` at its finest over the presses of the shipped table.
+/// What columns under the dynamics are off by in the course of a drop's force, against a field that is solved at every
+/// step, and in that of a press on a bent skin, which no other field can have: twice the largest error of `layer_after`
+/// at its finest over the presses of the shipped table. Of other presses it is measured on the scene, with few cells.
 const COURSE: f64 = 0.015;
+
+/// Courses of the first press that are compared, with so many cells.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Courses {
+    /// Pressures of a press at rest against the same columns under the arm's dynamics.
+    AtRest(usize),
+    /// Force of columns under the dynamics against the layer.
+    Columns(usize),
+}
 /// Share of the tolerance that a held pose may take: other presses of the scene stand a little differently.
 const MARGIN: f64 = 0.9;
 /// What is tried: shares of the scene's own force or depth, with the weights of their errors, and how far the body is
@@ -329,8 +339,8 @@ const MARGIN: f64 = 0.9;
 const POSES: [(f64, f64, [f64; 2]); 3] = [(1.0, 1.0, [0.0, 0.0]), (0.25, 0.5, [0.0, 0.0]), (1.0, 1.0, [0.3, 0.2])];
 
 /// Tries the levels on the contact of `scene`, a scene of columns, whose other parameters of `[contact]` are `contact`.
-/// Of those that keep to the tolerance it takes the cheapest that the scene `can_have`. `off_at_rest` says what a press
-/// at rest, with so many cells, is off by because its force follows the course without the arm's dynamics.
+/// Of those that keep to the tolerance it takes the cheapest that the scene `can_have`. `apart` says how far two courses
+/// are from each other, as a relative root mean square.
 ///
 /// A press is held under its force, and a ball at its deepest. The error of a level is that of the taxels' pressures
 /// there, against `layer` with the most cells that the part of the skin under the body can have, up to 24 a taxel.
@@ -342,7 +352,7 @@ pub(crate) fn choose(
     contact: &toml::Table,
     tolerance: Tolerance,
     can_have: impl Fn(&FidelityLevel, usize) -> bool,
-    off_at_rest: impl Fn(usize) -> f64,
+    apart: impl Fn(Courses) -> f64,
 ) -> Result<FidelityChoice, Refusal> {
     let task = if matches!(scene.task(), Task::Drop(_)) { "drop" } else { "press" };
     let wanted = tolerance.pressure(task).unwrap_or(0.0);
@@ -361,7 +371,7 @@ pub(crate) fn choose(
     let mut tried: Vec<(bool, usize, f64)> = vec![(true, trial.finest, 0.0)];
     let mut least = f64::INFINITY;
     // the course of the force hardly depends on the cells
-    let mut rest: Option<f64> = None;
+    let (mut at_rest, mut columns) = (None, None);
     for (cost_s_per_s, level, cells_per_taxel) in candidates {
         let elastic = level.coupled.is_some();
         let is_finest = level.name == REFERENCE && cells_per_taxel == trial.finest;
@@ -373,9 +383,14 @@ pub(crate) fn choose(
             None => difference(&trial.pressures(level, cells_per_taxel)?, &finest),
         };
         tried.push((elastic, cells_per_taxel, held));
-        let mut error = held.hypot(if level.coupled == Some(true) { 0.0 } else { COURSE });
+        let mut error = held;
+        if level.coupled != Some(true) && error <= MARGIN * wanted {
+            let measured = task == "press" && !bent;
+            let course = || if measured { apart(Courses::Columns(CELLS[0])) } else { COURSE };
+            error = error.hypot(*columns.get_or_insert_with(course));
+        }
         if !level.dynamic && error <= MARGIN * wanted {
-            error = error.hypot(*rest.get_or_insert_with(|| off_at_rest(cells_per_taxel)));
+            error = error.hypot(*at_rest.get_or_insert_with(|| apart(Courses::AtRest(cells_per_taxel))));
         }
         least = least.min(error);
         if (is_finest || error <= MARGIN * wanted) && can_have(level, cells_per_taxel) {

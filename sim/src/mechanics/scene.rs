@@ -3,9 +3,9 @@
 use super::bend::BendConfig;
 use super::press::{DropConfig, PressConfig};
 use super::timestep::{LONGEST_STEP_S, SHORTEST_STEP_S, StepLimit, Timestep, impact_damping};
-use crate::fidelity::{FidelityChoice, FidelityLevel, Tolerance, change_model, choose};
+use crate::fidelity::{Courses, FidelityChoice, FidelityLevel, Tolerance, change_model, choose};
 #[cfg(feature = "engine")]
-use crate::world::off_at_rest;
+use crate::world::apart;
 use serde::{Deserialize, Serialize};
 use spts_contact::mesh::{MeshReport, TriMesh, sphere};
 use spts_contact::{ContactField, DepthCurve, EquilibriumError, Pose, PosedMesh, PreparedMesh, build_contact};
@@ -99,20 +99,24 @@ impl MechanicsConfig {
             level.apply(&mut config.contact, cells);
             level.coupled.is_none() || Mechanics::build(config, folder, given.cloned()).is_ok()
         };
-        // without the engine there is no course to compare with
+        // without the engine there are no courses
         #[cfg(not(feature = "engine"))]
-        let off = |_: usize| f64::INFINITY;
+        let courses = |_: Courses| f64::INFINITY;
         #[cfg(feature = "engine")]
-        let off = |cells: usize| {
-            let at = |model: &str| {
+        let courses = |courses: Courses| {
+            let at = |level: &str, cells: usize| {
                 let mut config = Self { timestep_s: Some(Timestep::Auto), ..self.clone() };
-                FidelityLevel::named(model).iter().for_each(|level| level.apply(&mut config.contact, cells));
+                FidelityLevel::named(level).iter().for_each(|level| level.apply(&mut config.contact, cells));
                 Mechanics::build(config, folder, given.cloned())
             };
-            let both = at("footprint").and_then(|rest| Ok((rest, at("winkler")?)));
-            both.and_then(|(rest, moving)| off_at_rest(&rest, &moving)).unwrap_or(f64::INFINITY)
+            let (found, expected, of): (_, _, fn(&spts_contact::Frame) -> &[f64]) = match courses {
+                Courses::AtRest(cells) => (at("footprint", cells), at("winkler", cells), |f| f.pressure.values()),
+                Courses::Columns(cells) => (at("winkler", cells), at("layer", cells), |f| &f.wrench.force_n[2..]),
+            };
+            let both = found.and_then(|found| Ok((found, expected?)));
+            both.and_then(|(found, expected)| apart(&found, &expected, of)).unwrap_or(f64::INFINITY)
         };
-        let choice = choose(&scene, &self.contact, tolerance, can_have, off)?;
+        let choice = choose(&scene, &self.contact, tolerance, can_have, courses)?;
         choice.level.apply(&mut self.contact, choice.cells_per_taxel);
         self.chosen_for_tolerance = Some(tolerance);
         let FidelityChoice { error, finest_error, saves, .. } = choice;

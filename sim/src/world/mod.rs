@@ -6,17 +6,17 @@ mod dynamics;
 pub(crate) mod model;
 mod press;
 mod quasi_static;
-/// How far the taxels' pressures of the first press of `at_rest` are from those of `moving`, the same press with the
-/// arm's dynamics: the root mean square over all frames, relative to that of `moving`.
+/// How far `of` the frames of the first press of `found` are from those of `expected`, the same press otherwise: the
+/// root mean square of the differences over all frames, relative to that of `expected`.
 ///
 /// # Errors
 /// [`Refusal`] if either cannot be run.
-pub(crate) fn off_at_rest(at_rest: &Mechanics, moving: &Mechanics) -> Result<f64, Refusal> {
-    let (mut at_rest, mut moving) = (World::repeat(at_rest, 0)?, World::repeat(moving, 0)?);
+pub(crate) fn apart(found: &Mechanics, expected: &Mechanics, of: fn(&Frame) -> &[f64]) -> Result<f64, Refusal> {
+    let (mut found, mut expected) = (World::repeat(found, 0)?, World::repeat(expected, 0)?);
     let (mut off, mut whole) = (0.0, 0.0);
-    for (found, expected) in at_rest.frames().zip(moving.frames()) {
+    for (found, expected) in found.frames().zip(expected.frames()) {
         let (found, expected) = (found?, expected?);
-        for (p, q) in found.pressure.values().iter().zip(expected.pressure.values()) {
+        for (p, q) in of(&found).iter().zip(of(&expected)) {
             off += (p - q).powi(2);
             whole += q * q;
         }
