@@ -823,10 +823,10 @@ fn a_write_that_fails_half_way_damages_nothing() {
 fn a_full_disk_is_named_and_nothing_half_written_stays() {
     const CANNOT_MOUNT: i32 = 77;
     let dir = tempfile::tempdir().unwrap();
-    // what is known before, and what is not
+    // what is known before, and the pictures, which are not
     for (size, arguments, facts) in [
         ("256k", "simulate press/T", ["a run of 1 presses or drops needs 2 MB", "MB are free"]),
-        ("16k", "circuit --taxels 100", ["cannot be written", "No space left"]),
+        ("2700k", "simulate press/T", ["cannot be written", "No space left"]),
     ] {
         let script = format!(
             "mount -t tmpfs -o size={size} none \"$1\" || exit 77; \"$0\" {arguments} --out \"$1/o\"; s=$?; ls -A \"$1\"; \

@@ -10,7 +10,7 @@ use spts::circuit::Recording as Samples;
 use spts::data::{FrameArray, FrameOptions, Frames, SessionSet, wired};
 use spts::session::{Event, PressFacts, Recorded, Session as Whole};
 use spts::{Chain, ChainConfig, FrameUnit, SkinLayout};
-use spts_eval::{Untouched, idle_mean, idle_means};
+use spts_eval::{Untouched, idle_mean};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 

@@ -339,8 +339,8 @@ const MARGIN: f64 = 0.9;
 const POSES: [(f64, f64, [f64; 2]); 3] = [(1.0, 1.0, [0.0, 0.0]), (0.25, 0.5, [0.0, 0.0]), (1.0, 1.0, [0.3, 0.2])];
 
 /// Tries the levels on the contact of `scene`, a scene of columns, whose other parameters of `[contact]` are `contact`.
-/// Of those that keep to the tolerance it takes the cheapest that the scene `can_have`. `apart` says how far two courses
-/// are from each other, as a relative root mean square.
+/// Of those that keep to the tolerance it takes the cheapest that the scene `can_have`. `apart` says how far two
+/// courses are from each other, as a relative root mean square.
 ///
 /// A press is held under its force, and a ball at its deepest. The error of a level is that of the taxels' pressures
 /// there, against `layer` with the most cells that the part of the skin under the body can have, up to 24 a taxel.
