@@ -318,9 +318,10 @@ const FINEST: usize = 24;
 const MOST_CELLS: usize = 64;
 /// Most grid squares of an elastic field.
 const MOST_SQUARES: f64 = (1_u64 << 20) as f64;
-/// What columns under the dynamics are off by in the course of a drop's force, against a field that is solved at every
-/// step, and in that of a press on a bent skin, which no other field can have: twice the largest error of `layer_after`
-/// at its finest over the presses of the shipped table. Of other presses it is measured on the scene, with few cells.
+/// What columns under the dynamics are off by in the course of the force, against a field that is solved at every step:
+/// twice the largest error of `layer_after` at its finest over the presses of the shipped table. It stands for drops,
+/// and for bent skins, which no other field can have. Of other presses the course is measured on the scene, with few
+/// cells.
 const COURSE: f64 = 0.015;
 
 /// Courses of the first press that are compared, with so many cells.
@@ -370,7 +371,7 @@ pub(crate) fn choose(
     // a press is held by the same force on every level: two levels of one model feel the same
     let mut tried: Vec<(bool, usize, f64)> = vec![(true, trial.finest, 0.0)];
     let mut least = f64::INFINITY;
-    // the course of the force hardly depends on the cells
+    // measured once, with the first cells that ask for it
     let (mut at_rest, mut columns) = (None, None);
     for (cost_s_per_s, level, cells_per_taxel) in candidates {
         let elastic = level.coupled.is_some();

@@ -1,6 +1,6 @@
 //! Consecutive measurements of a block, and images fitted to them.
 
-use crate::windows::compressive_wires;
+use crate::windows::{compressive_wires, wire_means};
 use spts_circuit::{Recording, WeightRows};
 
 /// Steps of the conjugate gradients. L rows of N = L/4 random signs have a condition number of 9, so that a step halves
@@ -56,13 +56,7 @@ impl<'a> Chunk<'a> {
         let volts = &recording.blocks()[block].volts[start..start + len];
         let lost: Vec<bool> = volts.iter().map(|v| !v.is_finite()).collect();
         let rows = recording.rows(block, start..start + len);
-        let mut sums = vec![(0.0, 0_usize); compressive_wires(recording)];
-        for (k, v) in volts.iter().enumerate().filter(|(_, v)| v.is_finite()) {
-            let (sum, count) = &mut sums[rows.wire(k)];
-            *sum += v;
-            *count += 1;
-        }
-        let means_v: Vec<f64> = sums.iter().map(|(sum, count)| sum / (*count).max(1) as f64).collect();
+        let means_v = wire_means(recording, block, start..start + len);
         let above = |(k, v): (usize, &f64)| if v.is_finite() { v - means_v[rows.wire(k)] } else { 0.0 };
         let y: Vec<f64> = volts.iter().enumerate().map(above).collect();
         Self {

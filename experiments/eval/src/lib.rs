@@ -41,4 +41,4 @@ pub use skin_run::{SkinRun, SkinRunPresses, TwinSessions, footprint_scene, twin_
 pub use source::{PublishedSkin, ScoredSkin, Source, check_session};
 pub use table::{Cell, Table, TextTable, escape};
 pub use tally::{Scores, Tally, unique};
-pub use windows::{Press, PressRows, Untouched, Window, idle_mean, idle_means};
+pub use windows::{Press, PressRows, Untouched, Window, idle_mean, idle_means, wire_means};

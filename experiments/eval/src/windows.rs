@@ -294,6 +294,20 @@ pub fn idle_means(recording: &Recording, block: usize) -> Vec<f64> {
     (0..wires).map(mean).collect()
 }
 
+/// Mean output of every wire over the measurements `range` of block `block`, V; lost samples are ignored, and a wire
+/// without any has 0.
+pub fn wire_means(recording: &Recording, block: usize, range: Range<usize>) -> Vec<f64> {
+    let rows = recording.rows(block, range.clone());
+    let mut sums = vec![(0.0, 0_usize); compressive_wires(recording)];
+    let samples = recording.blocks()[block].volts[range].iter().enumerate();
+    for (k, v) in samples.filter(|(_, v)| v.is_finite()) {
+        let (sum, count) = &mut sums[rows.wire(k)];
+        *sum += v;
+        *count += 1;
+    }
+    sums.iter().map(|(sum, count)| sum / (*count).max(1) as f64).collect()
+}
+
 /// Wires whose samples follow one another in `recording`.
 pub(crate) fn compressive_wires(recording: &Recording) -> usize {
     if recording.mode() == Mode::Compressive { recording.weights().wire_count() } else { 1 }

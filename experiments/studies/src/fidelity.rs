@@ -15,7 +15,7 @@ use spts_contact::Frame;
 use spts_contact::mesh::{TriMesh, cylinder, extrude, sphere};
 use spts_eval::decoders::{TrainedDecoder, published};
 use spts_eval::training::Learned;
-use spts_eval::{Scorer, Tally, Untouched, Window};
+use spts_eval::{Scorer, Tally, Untouched, Window, wire_means};
 use spts_input::Refusal;
 use spts_models::{SkinLayout, Streams};
 use spts_recon::Matrix;
@@ -712,15 +712,8 @@ impl ReferenceScores {
         let [start, end] = truth.run.span_s.map(index);
         let first_s = truth.run.frames.iter().find(|f| f.wrench.force_n[2] > 0.0);
         let quiet = index(IDLE * first_s.map_or(scene.duration_s(), |f| f.time_s));
-        let mut idle = vec![(0.0, 0_usize); recording.weights().wire_count()];
-        let rows = recording.rows(0, 0..quiet);
-        for (k, v) in volts[..quiet].iter().enumerate() {
-            let (sum, count) = &mut idle[rows.wire(k)];
-            *sum += v;
-            *count += 1;
-        }
-        let offsets_v = idle.iter().map(|(sum, count)| sum / (*count).max(1) as f64).collect();
-        let press = Untouched { offsets_v, image: None }.press(&recording, 0, start..end);
+        let untouched = Untouched { offsets_v: wire_means(&recording, 0, 0..quiet), image: None };
+        let press = untouched.press(&recording, 0, start..end);
         // at least 20 windows
         let most = (press.len() / 20).max(1);
         let measurements = (scene.skin().taxels() / TAXELS_PER_MEASUREMENT).clamp(1, most);

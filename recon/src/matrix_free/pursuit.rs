@@ -67,8 +67,8 @@ impl RegionPursuit {
     /// Reconstructs the image of `y`, one value ≥ 0 a taxel, row-major.
     ///
     /// # Errors
-    /// [`Refusal`] if the length of `y` differs from the rows of Φ, if Φ does not have one column a taxel, for a NaN or
-    /// an infinity, or if the image exceeds the range of numbers.
+    /// [`Refusal`] if `y` is not as long as Φ has rows, if Φ has not one column a taxel, for a NaN or an infinity, or
+    /// if the image exceeds the range of numbers.
     pub fn recover<A: SelectColumns>(&self, phi: &A, y: &[f64]) -> Result<Vec<f64>, Refusal> {
         check(phi, y)?;
         let taxels = self.rows * self.cols;

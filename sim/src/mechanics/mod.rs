@@ -23,5 +23,7 @@ pub use bend::BendConfig;
 pub use press::{DropConfig, MAX_LIDDED_TILT_DEG, PressConfig, PressedObject};
 #[cfg(feature = "engine")]
 pub(crate) use press::{RAMP_CORNER, ramp_s};
-pub use scene::{ARM_MASS_KG, Expected, GRAVITY_M_PER_S2, Mechanics, MechanicsConfig, Overhang, Task};
+pub use scene::{
+    ARM_MASS_KG, Expected, FLIGHT_INTERVAL_S, GRAVITY_M_PER_S2, Mechanics, MechanicsConfig, Overhang, Task,
+};
 pub use timestep::{BLOCK_S, LONGEST_STEP_S, SHORTEST_STEP_S, Timestep};

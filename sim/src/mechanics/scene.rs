@@ -143,6 +143,8 @@ pub enum Task<'a> {
     Drop(&'a DropConfig),
 }
 
+/// Time between the frames of a drop while the ball is away from the skin, s.
+pub const FLIGHT_INTERVAL_S: f64 = 2e-3;
 /// Longest time between the frames of a press, s: ten frames a second still show its ramps.
 const LONGEST_FRAME_INTERVAL_S: f64 = 0.1;
 /// Time between the frames of a press where no other is asked for, s: the least and the most.

@@ -3,7 +3,7 @@
 use super::drop::{Ball, BallMotion, Bounce, BounceLog, Sample, Start};
 use super::model;
 use super::press::{PressDriver, PressPlan};
-use crate::mechanics::{Mechanics, Task};
+use crate::mechanics::{FLIGHT_INTERVAL_S, Mechanics, Task};
 use mujoco_rs::prelude::{MjData, MjModel, MjtObjBase};
 use spts_contact::{ContactField, Frame, Pose, PosedMesh, PreparedMesh, TaxelBins};
 use spts_input::Refusal;
@@ -13,8 +13,6 @@ pub fn no_pressure(force_n: f64, time_s: f64, reason: &str) -> Refusal {
     Refusal::new(format!("no pressure under {force_n:e} N at {time_s:.4} s: {reason}"))
 }
 
-/// Time between the frames of a drop while the ball is away from the skin, s.
-const FLIGHT_INTERVAL_S: f64 = 2e-3;
 /// A ball is near the skin when its lowest point is below this, m (and not below the skin altogether, having rolled
 /// off).
 const NEAR_M: f64 = 5e-3;

@@ -9,14 +9,12 @@ use spts_contact::mesh::{MAX_FILE_BYTES, MeshReport};
 use spts_input::{InputError, Refusal};
 use spts_models::REFERENCE_PA;
 use spts_sim::fidelity::LEVELS;
-use spts_sim::mechanics::Mechanics;
+use spts_sim::mechanics::{FLIGHT_INTERVAL_S, Mechanics};
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
 /// Maps of a frame in files: pressure, electrode pressure and conductance.
 const MAPS: f64 = 3.0;
-/// Time between the frames of a drop while the ball is away from the skin, s.
-const FLIGHT_INTERVAL_S: f64 = 2e-3;
 /// Bytes of a line of `frames.csv`.
 const FRAME_LINE: f64 = 230.0;
 
