@@ -25,7 +25,9 @@ class Scores:
     ----------
     rows : list of dict
         `decoder`, `m`, `left_out`, `learned_from`, `sensing`, means over objects of `support` (share of taxels on the
-        right side of the support), `iou`, `f1`, `class_single` and so on, and their 95 % bands, `iou_ci` and so on.
+        right side of the support), `iou`, `f1`, `class_single` and so on, and their 95 % bands over objects, `iou_ci` and
+        so on. On sessions also `ceiling` (IoU that the truth itself reaches), `worst_object` and `worst_iou`, `cosine`,
+        `jaccard` (no threshold), and `iou_raster` (against one frame of a raster scan).
     objects : list of dict
         The same of every object.
     """
@@ -204,7 +206,7 @@ def _takes(estimator, argument):
 
 
 def _on_rows(named, data, measurements, split, span):
-    """Scores on rows of a data set; bands over presses."""
+    """Scores on rows of a data set."""
     phi, y, truths, names, presses = data.labelled(split, span)
     shape = data.shape
     most = y.shape[1]
@@ -224,7 +226,7 @@ def _on_rows(named, data, measurements, split, span):
             else:
                 accuracy, iou = support_scores(np.ascontiguousarray(found.reshape(len(found), -1), np.float64), truths)
                 values = {"support": accuracy, "iou": iou}
-            bands = {f"{key}_ci": _band(value, presses) for key, value in values.items()}
+            bands = {f"{key}_ci": _band(value, names, presses) for key, value in values.items()}
             lines.append({**line, **{key: float(value.mean()) for key, value in values.items()}, **bands})
             for object in np.unique(names):
                 own = names == object
@@ -259,9 +261,10 @@ def _ready_for(one, learn, shape, m):
     return one.fit(X, images)
 
 
-def _band(values, presses):
-    """95 % band of the mean, whole presses drawn anew."""
-    number = np.unique(presses, return_inverse=True)[1]
+def _band(values, objects, presses):
+    """95 % band of the mean, whole objects drawn anew; whole presses of a single object."""
+    objects = np.unique(objects, return_inverse=True)[1]
+    number = objects if objects.any() else np.unique(presses, return_inverse=True)[1]
     sums, counts = np.bincount(number, values), np.bincount(number)
     rng = np.random.default_rng(0)
     drawn = rng.integers(0, len(sums), (_RESAMPLINGS, len(sums)))

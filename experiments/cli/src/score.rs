@@ -35,11 +35,15 @@ use std::time::Duration;
 /// Scores decoders side by side on recordings of a skin.
 ///
 /// Every decoder sees the same windows of M consecutive measurements of the scored presses, and is scored against the
-/// same true image: the conductances of the press where a simulation knows them, else a raster scan of another press.
-/// If a session has fewer than 15 presses, all are scored. Of a longer session, ten presses are scored; those before
+/// same true image: the conductances of the press where a simulation knows them; else the non-negative least-squares
+/// image of the same press, from all samples of the hold but those of the window (of as many as eight a taxel); else
+/// one frame of a raster scan of another press, which is how the publication scores. The ceiling is the IoU that such a
+/// truth itself reaches. If a session has fewer than 15 presses, all are scored. Of a longer session, ten presses are scored; those before
 /// them condition the skin.
 ///
-/// The scores are: support accuracy, IoU and F1 of the image; the share of correct classes of single windows, of votes
+/// The scores are: IoU of the supports (the taxels above 23 % of the maximum), with the 95 % interval over objects,
+/// their sessions and presses, and the object with the lowest; cosine and weighted Jaccard index of the images, which
+/// have no threshold; IoU by the raster frame; support accuracy and F1; the share of correct classes of single windows, of votes
 /// of 20 windows, and of evidence added up over 20 windows; the time of a decode on one thread, beside the time in
 /// which the measurements arrive; and the error of the place of the bouncing ball and of touches, such as those of the
 /// skin around a robot's arm. The ball's place is scored as recorded, where all drops fall on the middle of the skin,
@@ -508,16 +512,30 @@ fn verdict(found: &[Regression]) -> Result<(), CliError> {
 
 /// Refuses to save a board where one cannot be written, and in place of a file that is no board.
 fn check_board(path: &Path) -> Result<(), CliError> {
-    Ok(check_replaceable(path, |path| read_board(path).is_ok())?)
+    Ok(check_replaceable(path, |path| any_board(path).is_ok())?)
 }
 
 /// Largest board that is read, bytes: one of all decoders, sources and objects has less than 1 MB.
 const MAX_BOARD_BYTES: u64 = 1 << 25;
 
-/// The board in a file that `--save` wrote.
-fn read_board(path: &Path) -> Result<ScoreBoard, CliError> {
+/// The board in a file that `--save` wrote, of any version.
+fn any_board(path: &Path) -> Result<ScoreBoard, CliError> {
     let text = spts_input::read_text(path, MAX_BOARD_BYTES).map_err(Refusal::in_file(path))?;
     Ok(parse_json(path, &text).map_err(|refusal| refusal.reworded(|said| format!("{said}; `--save` writes boards")))?)
+}
+
+/// The board in a file that `--save` wrote, scored as this program scores.
+fn read_board(path: &Path) -> Result<ScoreBoard, CliError> {
+    let board = any_board(path)?;
+    if board.version != ScoreBoard::VERSION {
+        let problem = format!(
+            "`version` is {}, expected {}: its images were held against another truth; save it anew with `--save`",
+            board.version,
+            ScoreBoard::VERSION
+        );
+        return Err(Refusal::new(problem).at(path.display()).into());
+    }
+    Ok(board)
 }
 
 /// Name of what is learned from the objects in all their poses.

@@ -63,7 +63,7 @@ pub struct AnytimeRow {
     /// Scores, means over the objects.
     #[serde(flatten)]
     pub scores: StopScores,
-    /// 95 % confidence interval of `samples`, by resampling presses within every object.
+    /// 95 % confidence interval of `samples` over objects, their sessions and presses.
     pub samples_ci: Option<[f64; 2]>,
     /// 95 % confidence interval of `attained`, by the same resampling.
     pub attained_ci: Option<[f64; 2]>,
@@ -129,7 +129,7 @@ impl TrainedBoard<'_> {
             };
             let scores: Vec<StopScores> = presses.iter().map(pool).collect();
             let windows = |presses: &[PressStops]| presses.iter().map(|press| press.windows.len()).sum::<usize>();
-            let [samples_ci, attained_ci] = intervals(&presses);
+            let [samples_ci, attained_ci] = intervals(&presses, &self.run.objects());
             board.rows.push(AnytimeRow {
                 key: key.clone(),
                 most: self.run.most(),
@@ -209,7 +209,7 @@ impl End {
     }
 }
 
-/// The truth of a press.
+/// The truth of a window.
 #[derive(Clone, Copy)]
 enum Right<'a> {
     Class(usize),
@@ -231,13 +231,18 @@ fn stops(
     let Some((subject, mut confidence)) = decoder.trained.confidence() else {
         return Ok(stops);
     };
-    let (windows, right) = match (subject, label) {
-        (Subject::Image, _) => (scored.image_windows(most), Right::Support(&scored.truth().support)),
-        (Subject::Class, Some(label)) => (scored.class_runs(most), Right::Class(label)),
-        (Subject::Class, None) => (Vec::new(), Right::Class(0)),
+    let windows: Vec<(Window<'_>, Right<'_>)> = match (subject, label) {
+        (Subject::Image, _) => {
+            let (windows, truths) = scored.image_windows(most);
+            windows.into_iter().zip(truths).map(|(window, truth)| (window, Right::Support(&truth.support))).collect()
+        }
+        (Subject::Class, Some(label)) => {
+            scored.class_runs(most).into_iter().map(|window| (window, Right::Class(label))).collect()
+        }
+        (Subject::Class, None) => Vec::new(),
     };
     let mut scorer = Scorer::new(decoder);
-    for window in &windows {
+    for &(ref window, right) in &windows {
         stop(confidence.as_mut(), &mut scorer, window, ends, right, &mut stops)?;
     }
     Ok(stops)
@@ -387,15 +392,15 @@ fn mean(scores: &[StopScores], all: &StopScores) -> StopScores {
 }
 
 /// 95 % intervals of the means over objects of `samples` and `attained`, see [`bootstrap`].
-fn intervals(objects: &[Vec<PressStops>]) -> [Option<[f64; 2]>; 2] {
+fn intervals(sessions: &[Vec<PressStops>], objects: &[usize]) -> [Option<[f64; 2]>; 2] {
     // over the windows of a press: samples, attained, number
     let sums = |press: &PressStops| -> [f64; 3] {
         press.windows.iter().fold([0.0; 3], |[samples, attained, count], w| {
             [samples + w.samples as f64, attained + w.attained, count + 1.0]
         })
     };
-    let objects: Vec<Vec<[f64; 3]>> = objects.iter().map(|presses| presses.iter().map(sums).collect()).collect();
-    bootstrap(&objects, |drawn| {
+    let sessions: Vec<Vec<[f64; 3]>> = sessions.iter().map(|presses| presses.iter().map(sums).collect()).collect();
+    bootstrap(&sessions, objects, |drawn| {
         let mut means = [(!drawn.is_empty()).then_some(0.0); 2];
         for presses in drawn {
             let mut total = [0.0; 3];
@@ -626,10 +631,10 @@ mod tests {
         let all = pool([&few, &many]);
         let mean = mean(&[pool([&few]), pool([&many])], &all);
         assert!(near(mean.samples, 6.0) && near(mean.attained, 0.75) && near(mean.samples_median, 2.0));
-        let [samples, attained] = intervals(&[vec![few], vec![many]]);
-        let is = |interval: Option<[f64; 2]>, value| interval.is_some_and(|i| i.iter().all(|v| near(Some(*v), value)));
-        assert!(is(samples, 6.0) && is(attained, 0.75), "{samples:?}, {attained:?}");
-        assert_eq!(intervals(&[]), [None, None]);
+        let [samples, attained] = intervals(&[vec![few], vec![many]], &[0, 1]);
+        // of two objects, one draw in four has the first twice, and one the second
+        assert_eq!((samples, attained), (Some([2.0, 10.0]), Some([0.5, 1.0])));
+        assert_eq!(intervals(&[], &[]), [None, None]);
         assert_eq!(super::mean(&[], &all).samples, None);
     }
 }

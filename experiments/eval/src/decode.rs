@@ -198,6 +198,12 @@ impl DecodeRequest {
         let blocks = begins.par_iter().enumerate().map(|(block, &(start, ref untouched))| {
             let press = untouched.press(recording, block, start..start + longest);
             let truth = scored.truth(block);
+            let hold = scored.protocol.measurements(recording);
+            // without the samples of the window, as far as it lies in the hold
+            let without = |window: &Window<'_>, at: usize| {
+                let held = hold.start == start && start + at + window.y.len() <= hold.end;
+                truth.as_ref().map(|truth| if held { truth.without([*window]) } else { truth.truth.clone() })
+            };
             let all = |m: usize| press.windows(0..m * self.windows, m, m);
             let measured = self.measurements.iter().flat_map(|&m| all(m)).map(|(at, window)| MeasuredWindow {
                 block,
@@ -214,17 +220,17 @@ impl DecodeRequest {
                 for &m in &self.measurements {
                     let (starts, windows): (Vec<usize>, Vec<Window<'_>>) = all(m).unzip();
                     let answers = algorithm.decode_all(&windows)?;
-                    let answers = starts.iter().zip(answers);
-                    rows.extend(answers.map(|(&at, answer)| DecodedWindow {
+                    let answers = starts.iter().zip(&windows).zip(answers);
+                    rows.extend(answers.map(|((&at, window), answer)| DecodedWindow {
                         window: at / m,
                         decoder: spec.name,
                         m,
                         start: start + at,
-                        ..learned.judged(session, truth.as_ref(), block, answer)
+                        ..learned.judged(session, without(window, at).as_ref(), block, answer)
                     }));
                 }
             }
-            Ok((rows, measured, truth.map(|truth| truth.image)))
+            Ok((rows, measured, truth.map(|known| known.truth.image)))
         });
         let blocks = blocks.collect::<Result<Vec<_>, Refusal>>()?;
         let mut decoded = DecodedSession {

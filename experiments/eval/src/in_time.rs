@@ -6,13 +6,12 @@
 //! times after the touch its image is scored, together with the decoder's images for the last window alone and for a
 //! longer window with as many samples as there are taxels. [`crate::board::TrainedBoard::in_time`] trains the decoders.
 //!
-//! During the rise of a press the true support is that of the least-squares image of the samples after the window,
-//! which no decoder has used; during the hold it is the board's. The ground truth of a drop is the least-squares image
+//! The true support of a press is that of the least-squares image of the samples after the window, which no decoder has
+//! used; during the hold of a simulated press it is that of what the taxels conduct. The ground truth of a drop is the least-squares image
 //! of the whole contact, as for places; it includes the decoded samples.
 
 use crate::algorithm::DecodeError;
 use crate::board::{Entry, TrainedBoard, no_session};
-use crate::chunk::Chunk;
 use crate::decode::{no_recording, too_many, untrained};
 use crate::decoders::{TrainedDecoder, find, not_in_time, short_label};
 use crate::place::{RecordedBounce, contact_image, find_bounces, touch_of};
@@ -22,6 +21,7 @@ use crate::session::ScoredSession;
 use crate::table::{Cell, Table, TextTable, fixed};
 use crate::tally::{ScoreColumn, bootstrap, unique};
 use crate::training::{SHAPES, TrainingData};
+use crate::truth::{TruthKind, fitted};
 use crate::windows::{Press, Untouched};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -130,15 +130,15 @@ impl TrainedBoard<'_> {
         let dropped = dropped.collect::<Result<Vec<_>, Refusal>>()?;
         let mut board = InTimeBoard::default();
         for (at, ((entry, m), objects)) in self.run.slots(&self.entries).zip(&pressed).enumerate() {
-            board.rows.extend(lines(entry, ContactKind::Press, m, objects));
+            board.rows.extend(lines(entry, ContactKind::Press, m, objects, &self.run.objects()));
             for (session, contacts) in self.run.sessions.iter().zip(objects) {
-                let own = lines(entry, ContactKind::Press, m, std::slice::from_ref(contacts));
+                let own = lines(entry, ContactKind::Press, m, std::slice::from_ref(contacts), &[0]);
                 let object = session.title();
                 board.objects.extend(own.into_iter().map(|row| InTimeObject { object: object.to_owned(), row }));
             }
             if !entry.left_out || entry.learned_from == SHAPES {
                 let drops: Vec<Followed> = dropped.iter().map(|all| all[at].clone()).collect();
-                board.rows.extend(lines(entry, ContactKind::Drop, m, &[drops]));
+                board.rows.extend(lines(entry, ContactKind::Drop, m, &[drops], &[0]));
             }
         }
         Ok(board)
@@ -146,12 +146,18 @@ impl TrainedBoard<'_> {
 }
 
 /// A line for every moment that the contacts of the objects have; the hold comes last.
-fn lines(entry: &Entry, contact: ContactKind, m: usize, objects: &[Vec<Followed>]) -> Vec<InTimeRow> {
-    let mut moments: Vec<Moment> = unique(objects.iter().flatten().flatten().map(|(moment, _)| *moment));
+fn lines(
+    entry: &Entry,
+    contact: ContactKind,
+    m: usize,
+    sessions: &[Vec<Followed>],
+    objects: &[usize],
+) -> Vec<InTimeRow> {
+    let mut moments: Vec<Moment> = unique(sessions.iter().flatten().flatten().map(|(moment, _)| *moment));
     let time_s = |moment: &Moment| moment.unwrap_or(f64::INFINITY);
     moments.sort_by(|a, b| time_s(a).total_cmp(&time_s(b)));
     let each = moments.into_iter().map(|since_touch_s| {
-        let (scores, contacts) = scores(objects, since_touch_s);
+        let (scores, contacts) = scores(sessions, objects, since_touch_s);
         InTimeRow {
             decoder: entry.name.clone(),
             left_out: entry.left_out,
@@ -308,25 +314,26 @@ fn press(session: &ScoredSession, block: usize) -> Option<FollowedContact> {
     }
     let first = touch.start.saturating_sub(samples(LEAD_S, rate_hz));
     let untouched = &touch.untouched;
+    let len = TRUTH_PER_TAXEL * recording.taxels();
+    // the support of the samples that follow measurement `end`, up to measurement `last`
+    let later = |end: usize, last: usize| {
+        let press = (end + len <= last).then(|| untouched.press(recording, block, end..end + len))?;
+        Some(fitted(recording, &press)?.support)
+    };
     let rises = PRESS_S.iter().filter_map(|&time_s| {
         let end = touch.start + samples(time_s, rate_hz);
-        let len = TRUTH_PER_TAXEL * recording.taxels();
-        if end + len > hold.start * per_frame {
-            return None;
-        }
-        let mut image = Chunk::new(recording, block, end, len).fit(0)?.image;
-        if let Some(idle) = &untouched.image {
-            image.iter_mut().zip(idle).for_each(|(x, idle)| *x -= idle);
-        }
-        Some(ScoredMoment { at: Some(time_s), end: end - first, support: mask(&image), centre: None })
+        let support = later(end, hold.start * per_frame)?;
+        Some(ScoredMoment { at: Some(time_s), end: end - first, support, centre: None })
     });
     let mut moments: Vec<ScoredMoment> = rises.collect();
     let held = hold.clone().step_by(protocol.support_stride.max(1)).skip(1);
-    moments.extend(held.map(|frame| ScoredMoment {
-        at: None,
-        end: frame * per_frame - first,
-        support: truth.support.clone(),
-        centre: None,
+    moments.extend(held.filter_map(|frame| {
+        let end = frame * per_frame;
+        let support = match truth.kind {
+            TruthKind::Press => later(end, hold.end * per_frame)?,
+            TruthKind::Simulated | TruthKind::Raster => truth.truth.support.clone(),
+        };
+        Some(ScoredMoment { at: None, end: end - first, support, centre: None })
     }));
     let end = moments.iter().map(|moment| first + moment.end).max()?;
     Some(FollowedContact {
@@ -431,20 +438,20 @@ fn means(objects: &[Vec<&Sums>]) -> [Option<f64>; 8] {
 }
 
 /// Scores at the moment `at` of the contacts of every object, and how many contacts have them.
-fn scores(objects: &[Vec<Followed>], at: Moment) -> (InTimeScores, usize) {
-    let objects = objects.iter().map(|contacts| {
+fn scores(sessions: &[Vec<Followed>], objects: &[usize], at: Moment) -> (InTimeScores, usize) {
+    let each = sessions.iter().zip(objects).map(|(contacts, object)| {
         let sums = contacts.iter().map(|followed| sums(followed, at));
-        sums.filter(|s| s[2][1] > 0.0).collect()
+        (sums.filter(|s| s[2][1] > 0.0).collect(), *object)
     });
-    let mut objects: Vec<Vec<Sums>> = objects.collect();
-    objects.retain(|contacts| !contacts.is_empty());
-    let all: Vec<Vec<&Sums>> = objects.iter().map(|contacts| contacts.iter().collect()).collect();
+    let (sessions, objects): (Vec<Vec<Sums>>, Vec<usize>) =
+        each.filter(|(contacts, _): &(Vec<Sums>, usize)| !contacts.is_empty()).unzip();
+    let all: Vec<Vec<&Sums>> = sessions.iter().map(|contacts| contacts.iter().collect()).collect();
     let m = means(&all);
-    let ci = bootstrap(&objects, |drawn| {
+    let ci = bootstrap(&sessions, &objects, |drawn| {
         let m = means(drawn);
         [m[0], m[2], m[3]]
     });
-    let error_ci = bootstrap(&objects, |drawn| [means(drawn)[7]]);
+    let error_ci = bootstrap(&sessions, &objects, |drawn| [means(drawn)[7]]);
     let scores = InTimeScores {
         iou_alone: m[0],
         iou_alone_ci: ci[0],
@@ -459,7 +466,7 @@ fn scores(objects: &[Vec<Followed>], at: Moment) -> (InTimeScores, usize) {
         error_gain_px: m[7],
         error_gain_ci: error_ci[0],
     };
-    (scores, objects.iter().map(Vec::len).sum())
+    (scores, sessions.iter().map(Vec::len).sum())
 }
 
 /// The decoder whose prior is followed: it knows no object.
@@ -691,16 +698,17 @@ mod tests {
         each.collect()
     }
 
-    /// Objects count alike, and so do the contacts that an interval draws; moments that nobody has are empty.
+    /// Objects count alike, and intervals are over objects; moments that nobody has are empty.
     #[test]
     fn objects_count_alike() {
         let (few, many) = (followed(&[(0.2, 0.8)]), followed(&[(0.6, 0.6); 9]));
-        let (found, contacts) = scores(&[vec![few.clone()], vec![many]], None);
+        let (found, contacts) = scores(&[vec![few.clone()], vec![many]], &[0, 1], None);
         let near = |found: Option<f64>, value: f64| found.is_some_and(|found| (found - value).abs() < 1e-12);
         assert!(near(found.iou_alone, 0.4) && near(found.iou_in_time, 0.7) && near(found.iou_gain, 0.3));
-        assert!(found.iou_gain_ci.is_some_and(|ci| ci.iter().all(|v| near(Some(*v), 0.3))));
+        // of two objects, one draw in four has the first twice, and one the second
+        assert!(found.iou_gain_ci.is_some_and(|[low, high]| near(Some(low), 0.0) && near(Some(high), 0.6)));
         assert_eq!((contacts, found.iou_longer, found.error_gain_px), (2, None, None));
-        let (nothing, contacts) = scores(&[vec![few]], Some(0.001));
+        let (nothing, contacts) = scores(&[vec![few]], &[0], Some(0.001));
         assert_eq!((nothing.iou_alone, contacts), (None, 0));
     }
 }

@@ -27,6 +27,7 @@ mod source;
 mod table;
 mod tally;
 pub mod training;
+mod truth;
 mod windows;
 
 pub use alignment::{SessionSlip, find_slips, follow_slips, slips_text};
@@ -41,4 +42,5 @@ pub use skin_run::{SkinRun, SkinRunPresses, TwinSessions, footprint_scene, twin_
 pub use source::{PublishedSkin, ScoredSkin, Source, check_session};
 pub use table::{Cell, Table, TextTable, escape};
 pub use tally::{Scores, Tally, unique};
+pub use truth::{PressTruth, TruthKind};
 pub use windows::{Press, PressRows, Untouched, Window, idle_mean, idle_means, wire_means};

@@ -152,7 +152,7 @@ pub fn score_sessions(
     measurements: &[usize],
     done: &(dyn Fn() + Sync),
 ) -> Result<Vec<ScoreRow>, Refusal> {
-    let run = Run { sessions: sessions.to_vec(), measurements: measurements.to_vec(), times: false };
+    let run = Run { sessions: sessions.to_vec(), measurements: measurements.to_vec(), times: false, by_raster: true };
     let entries = decoders.iter().map(|(name, decoder)| Entry::published(name, decoder, sessions.len()));
     let tallies = run.tallies(&entries.collect::<Vec<_>>(), done)?;
     let slots = decoders.iter().flat_map(|(decode, _)| measurements.iter().map(move |&m| (*decode, m)));
@@ -259,7 +259,7 @@ pub fn baselines(sessions: &[ScoredSession], learned: &Learned) -> Vec<BaselineR
             f1: s.f1,
             balanced_accuracy: s.balanced_accuracy,
         };
-        for (session, truth) in sessions.iter().filter_map(|s| Some((s, s.truth(0)?))) {
+        for (session, truth) in sessions.iter().filter_map(|s| Some((s, s.raster_truth()?))) {
             let score = SupportScore::new(mask, &truth.support);
             mean.add(score);
             rows.push(row(session.title(), score));

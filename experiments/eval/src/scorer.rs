@@ -7,6 +7,7 @@ use crate::sensing::RowChooser;
 use crate::session::ScoredSession;
 use crate::tally::Tally;
 use crate::training::TrainingData;
+use crate::truth::PressTruth;
 use crate::windows::{Press, Untouched, Window};
 use spts_circuit::Recording;
 use spts_input::Refusal;
@@ -15,13 +16,16 @@ use spts_recon::classify::Src;
 use spts_recon::metrics::median;
 use std::hint::black_box;
 use std::ops::Range;
+use std::sync::Arc;
 use std::time::Instant;
 
 /// A press, and what is scored of it.
 #[derive(Debug)]
 pub(crate) struct ScoredPress<'a> {
     measured: Measured,
-    truth: Truth,
+    truth: Arc<PressTruth>,
+    /// Truth of every window for images, without the samples of the longest one.
+    truths: Vec<Truth>,
     protocol: &'a Protocol,
     measurements_per_frame: usize,
 }
@@ -55,17 +59,50 @@ impl<'a> ScoredPress<'a> {
     /// Block `block` of the compressive recording of `session`, for windows of up to `most` measurements; `None`
     /// without that recording or a true image.
     pub(crate) fn new(session: &'a ScoredSession, block: usize, most: usize) -> Option<Self> {
+        Self::against(session, block, most, session.truth(block)?)
+    }
+
+    /// The same against the raster frame of another press, as published; `None` without one.
+    pub(crate) fn by_raster(session: &'a ScoredSession, block: usize, most: usize) -> Option<Self> {
+        Self::against(session, block, most, PressTruth::by_raster(session)?)
+    }
+
+    fn against(session: &'a ScoredSession, block: usize, most: usize, truth: PressTruth) -> Option<Self> {
         let recording = session.compressive.as_ref()?;
         let range = session.protocol.measurements(recording);
-        Some(Self {
-            truth: session.truth(block)?,
+        let mut press = Self {
+            truth: Arc::new(truth),
+            truths: Vec::new(),
             measured: match recording.taxels() > MANY_TAXELS {
                 true => Measured::Few(few(recording, block, range, most)),
                 false => Measured::Recorded(Press::new(recording, block, &session.protocol)),
             },
             protocol: &session.protocol,
             measurements_per_frame: recording.measurements_per_frame(),
-        })
+        };
+        press.truths = press.truths_of(most);
+        Some(press)
+    }
+
+    /// The truth of every window for images of up to `most` measurements.
+    fn truths_of(&self, most: usize) -> Vec<Truth> {
+        let samples = |press: &Press, range: Range<usize>| {
+            let end = range.end.min(press.len());
+            self.truth.without((range.start..end).filter_map(|k| press.window(k, 1)))
+        };
+        match &self.measured {
+            Measured::Recorded(press) => {
+                let starts = (0..press.len()).step_by(self.stride());
+                starts.map(|start| samples(press, start..start + most)).collect()
+            }
+            Measured::Chosen([images, _]) => images.iter().map(|press| samples(press, 0..most)).collect(),
+            Measured::Few(presses) => presses.iter().map(|press| samples(press, 0..most)).collect(),
+        }
+    }
+
+    /// Measurements from the start of a window for images to that of the next one.
+    fn stride(&self) -> usize {
+        (self.protocol.support_stride * self.measurements_per_frame).max(1)
     }
 
     /// The same press, with windows of up to `most` measurements at rows that `chooser` chooses: those of classes for
@@ -85,7 +122,9 @@ impl<'a> ScoredPress<'a> {
                 return Err(Refusal::new(problem));
             }
         };
-        Ok(Self { measured, truth: self.truth.clone(), ..*self })
+        let mut chosen = Self { measured, truth: Arc::clone(&self.truth), truths: Vec::new(), ..*self };
+        chosen.truths = chosen.truths_of(most);
+        Ok(chosen)
     }
 
     /// The press, if its rows are there as numbers.
@@ -101,21 +140,24 @@ impl<'a> ScoredPress<'a> {
         Ok(self)
     }
 
-    /// The true contact.
-    pub(crate) fn truth(&self) -> &Truth {
+    /// What is known of the true contact.
+    pub(crate) fn truth(&self) -> &PressTruth {
         &self.truth
     }
 
-    /// Windows of `m` measurements for the scores of images.
-    pub(crate) fn image_windows(&self, m: usize) -> Vec<Window<'_>> {
-        match &self.measured {
+    /// Windows of `m` measurements for the scores of images, and the truth of each.
+    pub(crate) fn image_windows(&self, m: usize) -> (Vec<Window<'_>>, Vec<&Truth>) {
+        let each: Vec<_> = match &self.measured {
             Measured::Recorded(press) => {
-                let stride = self.protocol.support_stride * self.measurements_per_frame;
-                press.windows(0..press.len(), m, stride).map(|(_, w)| w).collect()
+                let windows = press.windows(0..press.len(), m, self.stride());
+                windows.map(|(start, window)| (window, &self.truths[start / self.stride()])).collect()
             }
-            Measured::Chosen([images, _]) => images.iter().filter_map(|press| press.window(0, m)).collect(),
-            Measured::Few(presses) => presses.iter().filter_map(|press| press.window(0, m)).collect(),
-        }
+            Measured::Chosen([presses, _]) | Measured::Few(presses) => {
+                let each = presses.iter().zip(&self.truths);
+                each.filter_map(|(press, truth)| Some((press.window(0, m)?, truth))).collect()
+            }
+        };
+        each.into_iter().unzip()
     }
 
     /// Windows of `m` measurements for classes that need no vote, up to as many as the protocol scores.
@@ -137,7 +179,7 @@ impl<'a> ScoredPress<'a> {
                 press.windows(0..count * m, m, m).map(|(_, w)| w).collect()
             }
             Measured::Chosen([_, classes]) => classes.iter().filter_map(|press| press.window(0, m)).collect(),
-            Measured::Few(_) => self.image_windows(m),
+            Measured::Few(presses) => presses.iter().filter_map(|press| press.window(0, m)).collect(),
         }
     }
 
@@ -201,9 +243,11 @@ impl<'a> Scorer<'a> {
         m: usize,
         label: Option<usize>,
     ) -> Result<Tally, DecodeError> {
-        let mut tally = Tally::default();
-        for answer in self.answers(&scored.image_windows(m))? {
-            tally.image(&answer.image, &scored.truth.support);
+        let known = scored.truth();
+        let mut tally = Tally::of(known);
+        let (windows, truths) = scored.image_windows(m);
+        for (answer, truth) in self.answers(&windows)?.iter().zip(truths) {
+            tally.image_of(&answer.image, truth, known.raster.as_ref());
             // windows of the classes are counted below, and overlap with these
             tally.failed += usize::from(answer.failed && label.is_none());
         }

@@ -1,6 +1,7 @@
 //! A session prepared for scoring: number of its class, scored blocks and frames, and true images.
 
 use crate::protocol::{Protocol, Truth};
+use crate::truth::{PressTruth, may_be_fitted};
 use spts::Session;
 use spts::session::Event;
 use spts_circuit::Recording;
@@ -56,12 +57,13 @@ impl ScoredSession {
         }
     }
 
-    /// Ground truth of block `block` of the compressive recording: the conductances if a simulation knows them, else
-    /// the raster scan of the object. `None` if there is neither.
-    pub fn truth(&self, block: usize) -> Option<Truth> {
-        if let Some(Some(conductances)) = self.simulated.get(block) {
-            return Some(Truth::of(conductances.clone()));
-        }
+    /// What is known of the true image of block `block` of the compressive recording.
+    pub fn truth(&self, block: usize) -> Option<PressTruth> {
+        PressTruth::of(self, block)
+    }
+
+    /// A frame of the raster scan of the object, of another press; `None` without a scan of a steady contact.
+    pub fn raster_truth(&self) -> Option<Truth> {
         let raster = self.raster.as_ref().filter(|_| self.held)?;
         Some(Truth::new(raster, &self.raster_protocol))
     }
@@ -73,7 +75,10 @@ impl ScoredSession {
 
     /// Whether there is a compressive recording and a true image for it.
     pub fn scorable(&self) -> bool {
-        self.scored().any(|block| self.truth(block).is_some())
+        let known = |block: usize| self.simulated.get(block).is_some_and(Option::is_some);
+        let fitted = |r: &Recording| may_be_fitted(r, self.protocol.measurements(r).len());
+        let held = self.held && (self.raster.is_some() || self.compressive.as_ref().is_some_and(fitted));
+        self.scored().any(|block| held || known(block))
     }
 
     /// Scored blocks of the compressive recording.

@@ -222,6 +222,12 @@ impl Press {
         Self { rows: Arc::new(self.rows.renamed(to)), ..self.clone() }
     }
 
+    /// Rows as numbers, wires and samples above the untouched skin's output of the measurements in `range`.
+    pub(crate) fn measured(&self, range: Range<usize>) -> (&[f64], &[u16], &[f64]) {
+        let wires = self.rows.wires.get(range.clone()).unwrap_or_default();
+        (self.rows.numbers(range.clone()), wires, &self.y[range])
+    }
+
     /// Number of measurements.
     pub fn len(&self) -> usize {
         self.y.len()

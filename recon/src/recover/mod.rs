@@ -2,12 +2,13 @@
 //! in [`RECOVER`]; one with a prior has a line in [`REGULARISED`]. [`conformance`] and [`conformance_regularised`] run
 //! on all of them.
 //!
-//! Two algorithms have another interface: [`SequentialEstimate`] accepts rows one by one, and [`TrackedImage`] follows
-//! a changing image from window to window.
+//! Three have another interface: [`SequentialEstimate`] accepts rows one by one, [`TrackedImage`] follows a changing
+//! image from window to window, and [`LeastSquares`] fits one image to many measurements.
 
 mod conformance;
 mod fixed;
 mod gaussian;
+mod least_squares;
 mod nn_lasso;
 mod nnqp;
 mod prior;
@@ -20,6 +21,7 @@ mod unrolled;
 pub use conformance::{conformance, conformance_regularised};
 pub use fixed::{Fixed, FixedWindow};
 pub use gaussian::{Lmmse, NnLmmse};
+pub use least_squares::LeastSquares;
 pub use nn_lasso::NnLasso;
 pub(crate) use prior::no_images;
 pub use prior::{Gaussian, ImagePrior, Noise, Penalty, Stopping};

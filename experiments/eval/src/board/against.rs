@@ -146,6 +146,9 @@ mod tests {
         BoardRow {
             key: key(decoder, m),
             scores,
+            look_up: false,
+            worst_object: None,
+            worst_iou: None,
             support_ci: None,
             iou_ci: None,
             class_single_ci: None,
@@ -162,6 +165,7 @@ mod tests {
             let objects = cells.iter().map(|(object, decoder, m)| ObjectRow {
                 key: key(decoder, *m),
                 object: (*object).to_owned(),
+                truth: None,
                 scores: Scores::default(),
                 iou_ci: None,
                 class_single_ci: None,

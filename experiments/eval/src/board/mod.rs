@@ -14,7 +14,7 @@ pub use table::{table, write};
 
 use crate::algorithm::{Contender, DecodeError};
 use crate::alignment::SessionSlip;
-use crate::decoders::DecoderSpec;
+use crate::decoders::{DecoderSpec, Needs};
 use crate::place::{PlaceRow, places, touch_places};
 use crate::scorer::{ScoredPress, Scorer, decode_us};
 use crate::sensing::{RowChooser, Sensing};
@@ -22,6 +22,7 @@ use crate::session::ScoredSession;
 use crate::source::Source;
 use crate::tally::{Scores, Tally, intervals, mean, pool};
 use crate::training::{TrainedNetwork, TrainingData, TrainingSource};
+use crate::truth::TruthKind;
 pub(crate) use learning::Entry;
 use learning::Trainer;
 use rayon::prelude::*;
@@ -79,7 +80,8 @@ impl TrainedBoard<'_> {
     /// [`Refusal`].
     pub fn score(&self, done: &(dyn Fn() + Sync)) -> Result<ScoreBoard, Refusal> {
         let (rows, objects) = self.run.score(&self.entries, done)?;
-        Ok(ScoreBoard { rows, objects, slips: self.source.slips.clone(), ..ScoreBoard::default() })
+        let slips = self.source.slips.clone();
+        Ok(ScoreBoard { version: ScoreBoard::VERSION, rows, objects, slips, ..ScoreBoard::default() })
     }
 
     /// Results for the bouncing ball and for touches. Without a ball, there are none of locators with a dictionary;
@@ -154,7 +156,7 @@ impl BoardSettings {
         Ok(TrainedBoard {
             settings: self,
             source,
-            run: Run { sessions, measurements: self.measurements.clone(), times: self.times },
+            run: Run { sessions, measurements: self.measurements.clone(), times: self.times, by_raster: false },
             entries,
             dictionary,
         })
@@ -192,9 +194,17 @@ pub(crate) struct Run<'a> {
     pub(crate) measurements: Vec<usize>,
     /// Whether decodes are timed.
     pub(crate) times: bool,
+    /// Whether the truth is the raster frame of another press, as published.
+    pub(crate) by_raster: bool,
 }
 
 impl Run<'_> {
+    /// Number of the object of every session.
+    pub(crate) fn objects(&self) -> Vec<usize> {
+        let first = |s: &&ScoredSession| self.sessions.iter().position(|other| other.object == s.object).unwrap_or(0);
+        self.sessions.iter().map(first).collect()
+    }
+
     /// Session and block of every scored press.
     pub(crate) fn presses(&self) -> Vec<(usize, usize)> {
         let each = |(i, s): (usize, &&ScoredSession)| s.scored().map(|b| (i, b)).collect::<Vec<_>>();
@@ -243,7 +253,8 @@ impl Run<'_> {
         let slots = entries.len() * self.measurements.len();
         self.each_press(slots, done, |session, block| {
             let scored = self.sessions[session];
-            let Some(press) = ScoredPress::new(scored, block, self.most()) else {
+            let press = if self.by_raster { ScoredPress::by_raster } else { ScoredPress::new };
+            let Some(press) = press(scored, block, self.most()) else {
                 return Ok(Vec::new());
             };
             let classes = |entry: &Entry| entry.knows_classes;
@@ -275,11 +286,15 @@ impl Run<'_> {
                 sensing: entry.sensing,
             };
             let scores: Vec<Scores> = presses.iter().map(pool).collect();
-            let [support_ci, iou_ci, class_single_ci] = intervals(presses);
+            let [support_ci, iou_ci, class_single_ci] = intervals(presses, &self.objects());
+            let worst = worst(&self.sessions, &scores);
             let acquire_us = rate_hz.map_or(0.0, |rate_hz| m as f64 / rate_hz * 1e6);
             rows.push(BoardRow {
                 key: key.clone(),
                 scores: mean(&scores),
+                look_up: entry.knows_classes && find(&entry.name).is_some_and(|spec| spec.needs == Needs::Classes),
+                worst_object: worst.map(|(object, _)| object.to_owned()),
+                worst_iou: worst.map(|(_, iou)| iou),
                 support_ci,
                 iou_ci,
                 class_single_ci,
@@ -289,8 +304,9 @@ impl Run<'_> {
                 failed: presses.iter().flatten().map(|t| t.failed).sum(),
             });
             objects.extend(self.sessions.iter().zip(presses).zip(scores).map(|((session, presses), scores)| {
-                let [_, iou_ci, class_single_ci] = intervals(std::slice::from_ref(presses));
-                ObjectRow { key: key.clone(), object: session.title().to_owned(), scores, iou_ci, class_single_ci }
+                let [_, iou_ci, class_single_ci] = intervals(std::slice::from_ref(presses), &[0]);
+                let (object, truth) = (session.title().to_owned(), presses.first().and_then(|press| press.kind));
+                ObjectRow { key: key.clone(), object, truth, scores, iou_ci, class_single_ci }
             }));
         }
         Ok((rows, objects))
@@ -345,6 +361,12 @@ impl Run<'_> {
     }
 }
 
+/// The object with the lowest IoU, and that IoU; `None` for fewer than two objects.
+fn worst<'a>(sessions: &[&'a ScoredSession], scores: &[Scores]) -> Option<(&'a str, f64)> {
+    let each = sessions.iter().zip(scores).filter_map(|(session, scores)| Some((session.title(), scores.iou?)));
+    each.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|_| sessions.len() > 1)
+}
+
 /// What a row of the score table is about.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
 pub struct RowKey {
@@ -371,11 +393,22 @@ pub struct BoardRow {
     /// Scores, means over the objects.
     #[serde(flatten)]
     pub scores: Scores,
-    /// 95 % confidence interval of `support`, by resampling presses within every object.
+    /// Whether the answers are images of classes that were learned, the scored object among them. Such scores say
+    /// nothing of other objects.
+    #[serde(default)]
+    pub look_up: bool,
+    /// The object with the lowest `iou`, and that `iou`; `None` for a single object.
+    #[serde(default)]
+    pub worst_object: Option<String>,
+    /// See `worst_object`.
+    #[serde(default)]
+    pub worst_iou: Option<f64>,
+    /// 95 % confidence interval of `support` over objects, their sessions and presses; over the presses of a single
+    /// object.
     pub support_ci: Option<[f64; 2]>,
-    /// 95 % confidence interval of `iou`, by the same resampling.
+    /// The same of `iou`.
     pub iou_ci: Option<[f64; 2]>,
-    /// 95 % confidence interval of `class_single`, by the same resampling.
+    /// The same of `class_single`.
     pub class_single_ci: Option<[f64; 2]>,
     /// Median time of a decode on one thread, µs, from rows of weights and samples to image or class, including Φ·D.
     /// Only this column and `too_slow` differ between runs. `None` if times were not requested.
@@ -396,6 +429,9 @@ pub struct ObjectRow {
     pub key: RowKey,
     /// Object.
     pub object: String,
+    /// Where the true images come from.
+    #[serde(default)]
+    pub truth: Option<TruthKind>,
     /// Scores.
     #[serde(flatten)]
     pub scores: Scores,
@@ -410,6 +446,9 @@ pub struct ObjectRow {
 /// The score table, what `spts score` prints and saves: decoders side by side on the same windows.
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize)]
 pub struct ScoreBoard {
+    /// [`ScoreBoard::VERSION`] of the program that scored it. Boards of other versions are scored against other truths.
+    #[serde(default)]
+    pub version: u32,
     /// Means over the objects.
     pub rows: Vec<BoardRow>,
     /// Localisation of the bouncing ball, and of touches.
@@ -422,6 +461,9 @@ pub struct ScoreBoard {
 }
 
 impl ScoreBoard {
+    /// Version of the scores: 2 has images against their own press; before, they were against a raster frame.
+    pub const VERSION: u32 = 2;
+
     /// The row with this key.
     pub(crate) fn row_like(&self, key: &RowKey) -> Option<&BoardRow> {
         self.rows.iter().find(|row| row.key == *key)

@@ -7,6 +7,7 @@ use crate::sensing::Sensing;
 use crate::table::{Cell, Table, TextTable, fixed};
 use crate::tally::Scores;
 use crate::training::{PUBLISHED, RASTER};
+use crate::truth::TruthKind;
 use crate::unique;
 use spts::output::{OutputFolder, write_json};
 use spts_input::Refusal;
@@ -20,6 +21,7 @@ pub fn write(board: &ScoreBoard, out: &mut OutputFolder) -> Result<(), Refusal> 
     rows(&board.rows).write(out)?;
     keyed(Table::new("objects", &board.objects), |r| &r.key)
         .file("object", |r| &r.object)
+        .file("truth", |r| r.truth.map(TruthKind::name))
         .files(&Scores::COLUMNS, |r| &r.scores)
         .interval("iou", |r| r.iou_ci)
         .interval("class_single", |r| r.class_single_ci)
@@ -45,6 +47,9 @@ fn rows<'a>(rows: impl IntoIterator<Item = &'a BoardRow>) -> Table<'a, &'a Board
     let rows_with_remarks = rows.iter().any(|r| r.too_slow == Some(true) || r.failed > 0);
     let mut table = keyed(Table::new("board", rows), |r: &BoardRow| &r.key)
         .files(&Scores::COLUMNS, |r| &r.scores)
+        .file("look_up", |r| r.look_up)
+        .file("worst_object", |r| r.worst_object.as_deref())
+        .file("worst_iou", |r| r.worst_iou)
         .interval("support", |r| r.support_ci)
         .interval("iou", |r| r.iou_ci)
         .interval("class_single", |r| r.class_single_ci)
@@ -52,14 +57,20 @@ fn rows<'a>(rows: impl IntoIterator<Item = &'a BoardRow>) -> Table<'a, &'a Board
         .file("acquire_us", |r| r.acquire_us)
         .file("too_slow", |r| r.too_slow)
         .file("failed", |r| r.failed)
-        .shown("decoder", |r| short_label(&r.key.decoder))
+        .shown("decoder", |r| {
+            let mark = if r.look_up { " (look-up)" } else { "" };
+            format!("{}{mark}", short_label(&r.key.decoder))
+        })
         .shown("learned", |r| &r.key.learned_from)
         .shown("rows", |r| r.key.sensing.name())
         .shown("M", |r| r.key.m)
-        .number("support", 3, |r| r.scores.support)
         .number("IoU", 3, |r| r.scores.iou)
         .shown("(95 %)", |r| Cell::span(r.iou_ci, 3))
-        .number("F1", 3, |r| r.scores.f1)
+        .shown("worst", |r| Some(format!("{:.3} {}", r.worst_iou?, r.worst_object.as_deref()?)))
+        .number("ceiling", 3, |r| r.scores.ceiling)
+        .number("cosine", 3, |r| r.scores.cosine)
+        .number("by raster", 3, |r| r.scores.iou_raster)
+        .number("support", 3, |r| r.scores.support)
         .number("single", 3, |r| r.scores.class_single)
         .number("vote20", 3, |r| r.scores.class_vote20)
         .number("evidence", 3, |r| r.scores.class_evidence)
@@ -107,7 +118,11 @@ pub fn table(board: &ScoreBoard) -> String {
             out.push_str(&format!("{title}\n{}", rows(own).text()));
         }
     }
-    out.push_str("\nclasses: share correct of single windows, of votes of 20, of evidence added over 20; support counts every taxel, so that an empty image is right about all that is not touched\n");
+    out.push_str(&truths(board));
+    if board.rows.iter().any(|r| r.look_up) {
+        out.push_str("look-up: the answer is an image of a learned class, the scored object among them; it says nothing of other objects\n");
+    }
+    out.push_str("classes: share correct of single windows, of votes of 20, of evidence added over 20; support counts every taxel, so that an empty image is right about all that is not touched\n");
     if board.rows.iter().any(|r| r.key.sensing == Sensing::Chosen) {
         out.push_str("chosen rows: picked from those of a press for what was learned, before a sample is seen; their order in time is lost, and there are no votes\n");
     }
@@ -117,6 +132,32 @@ pub fn table(board: &ScoreBoard) -> String {
     out.push_str(&objects(board));
     out.push_str(&gaps(board));
     out.trim_end().to_owned()
+}
+
+/// What the scores of the images are held against.
+fn truths(board: &ScoreBoard) -> String {
+    let kinds = unique(board.objects.iter().filter_map(|object| object.truth));
+    let lines = kinds.iter().map(|kind| {
+        let names = unique(board.objects.iter().filter(|o| o.truth == Some(*kind)).map(|o| o.object.as_str()));
+        let what = match kind {
+            TruthKind::Simulated => "what the taxels conduct; ceiling: that of all samples of the press, fitted",
+            TruthKind::Press => {
+                "the least-squares image of the press, without the window's samples; ceiling: one half of the press \
+                 against the other"
+            }
+            TruthKind::Raster => "one frame of a raster scan of another press; no ceiling is known",
+        };
+        format!("truth of {}: {what}\n", names.join(", "))
+    });
+    let mut out = format!("\n{}", lines.collect::<String>());
+    if board.rows.iter().any(|r| r.scores.iou_raster.is_some()) {
+        out.push_str("by raster: IoU with one frame of a raster scan of another press, the score of the publication");
+        let ceilings: Vec<f64> = board.rows.iter().filter_map(|r| r.scores.ceiling_raster).collect();
+        out.push_str(&ceilings.first().map_or_else(String::new, |c| format!("; all samples of a press reach {c:.3}")));
+        out.push('\n');
+    }
+    out.push_str("(95 %): over objects, their sessions and presses; worst: the object with the lowest IoU\n");
+    out
 }
 
 /// IoU and single windows, object by object, at one M.

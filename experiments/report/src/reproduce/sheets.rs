@@ -55,7 +55,7 @@ impl ShownWindow {
             let answer = scorer.answers(&[press.window(0, m)?]).ok()?.pop()?;
             images.push((m, answer.image));
         }
-        Some(Self { images, y: press.window(0, longest)?.y.to_vec(), truth: session.truth(block)? })
+        Some(Self { images, y: press.window(0, longest)?.y.to_vec(), truth: session.truth(block)?.truth })
     }
 
     fn images(&self, cols: usize) -> impl Iterator<Item = Tile> + '_ {
