@@ -198,6 +198,16 @@ impl Recording {
         Self::new(info, blocks)
     }
 
+    /// The same recording, in which the samples of these ranges of measurements of blocks count as lost (NaN).
+    pub fn without(&self, lost: &[(usize, Range<usize>)]) -> Self {
+        let mut blocks = self.blocks.clone();
+        for (block, range) in lost {
+            let volts = blocks.get_mut(*block).and_then(|block| block.volts.get_mut(range.clone()));
+            volts.into_iter().for_each(|volts| volts.fill(f64::NAN));
+        }
+        self.with_samples_of(blocks)
+    }
+
     /// The same recording with blocks whose samples are this recording's own at other places, or lost.
     pub(crate) fn with_samples_of(&self, blocks: Vec<Block>) -> Self {
         Self { info: self.info.clone(), frames: self.frames, blocks }

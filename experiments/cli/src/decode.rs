@@ -14,7 +14,9 @@ use spts::session::Event;
 use spts_eval::decode::{DecodeRequest, DecodedSession, DecodedWindow, LearnedDecoders};
 use spts_eval::decoders::{AUTO, auto, short_label};
 use spts_eval::training::TrainingData;
-use spts_eval::{Labels, SessionSlip, Source, Table, check_session, follow_slips, slips_text, unique};
+use spts_eval::{
+    Alignment, Labels, SessionSlip, Source, Table, check_session, follow_slips, slips_text, unaligned_text, unique,
+};
 use spts_models::{SkinLayout, Streams};
 use std::path::{Path, PathBuf};
 
@@ -97,7 +99,7 @@ impl DecodeCommand {
         decoders_named(&self.decoder, Some(choice(&SkinLayout::default())))?;
         let mut set = SessionSet::open(&self.session)?;
         notes(&set.note);
-        let slips = follow_slips(&mut set);
+        let Alignment { slips, unaligned } = follow_slips(&mut set);
         let sessions = self.chosen(&set)?;
         for session in &sessions {
             // what `spts score` refuses, with the session's own skin
@@ -107,7 +109,7 @@ impl DecodeCommand {
         }
         let shown = |slip: &SessionSlip| sessions.iter().any(|session| session.name == slip.session);
         let slips: Vec<SessionSlip> = slips.into_iter().filter(shown).collect();
-        notes(&slips_text(&slips));
+        notes(slips_text(&slips).iter().chain(&unaligned_text(&unaligned)));
         let bars = Bars::default();
         bars.stage("learning", None);
         let training = Training::new(&set, self.skin.as_deref(), self.seed);

@@ -25,7 +25,7 @@ use spts_eval::training::{
     CALIBRATED, PUBLISHED, PoseKnowledge, PosedObject, RASTER, SHAPES, TrainedNetwork, TrainingData, TrainingSource,
     simulated_gain_sd,
 };
-use spts_eval::{ScoredSession, Sensing, Source, in_time, slips_text};
+use spts_eval::{Alignment, ScoredSession, Sensing, Source, in_time, slips_text, unaligned_text};
 use spts_input::Refusal;
 use spts_models::SkinLayout;
 use std::path::{Path, PathBuf};
@@ -353,7 +353,8 @@ impl ScoreCommand {
             Some(scenes) => simulated_sessions(scenes, self.seed, self.quick)?,
             None => Source::open(self.recordings.as_deref().unwrap_or(Path::new("")))?,
         };
-        notes(slips_text(&source.slips).iter().chain(&source.note));
+        let Alignment { slips, unaligned } = &source.alignment;
+        notes(slips_text(slips).iter().chain(&unaligned_text(unaligned)).chain(&source.note));
         Ok(source)
     }
 
@@ -373,7 +374,7 @@ impl ScoreCommand {
     fn fitting(&self, mut settings: BoardSettings, scored: &Source) -> BoardSettings {
         let layout = &scored.layout;
         let taxels = layout.taxels();
-        if taxels > TrainingData::MOST_TAXELS && !scored.learns() && scored.bounces.is_some() && !self.no_ball {
+        if taxels > TrainingData::MOST_TAXELS && !scored.learns() && !scored.drops.is_empty() && !self.no_ball {
             note("note: places of the ball are left out: their locators learn from scans, of which there are none");
         }
         let usual = !self.anytime && !self.in_time;

@@ -7,6 +7,10 @@
 //! chunk, searches other rows where the fit fails, and finds the measurement at which the rows change. An untouched
 //! skin gives no information: a slip there is found at the next contact.
 //!
+//! The contacts of a ball are shorter than such a chunk. Each is fitted as a whole ([`contact_slips`]), without values
+//! below zero, and compared with fits at rows that are certainly wrong: how much these leave depends on the length of
+//! the contact. A contact that no rows fit better is not scored.
+//!
 //! ```
 //! use spts_circuit::{Block, Recording, RecordingInfo, Seeding, Slip, WeightMode, Weights};
 //! use spts_eval::find_slips;
@@ -25,15 +29,18 @@
 //! ```
 
 use crate::chunk::{Chunk, Fit, chunk_len, converter_step_v};
+use crate::place::{RecordedBounce, find_bounces};
 use rayon::prelude::*;
 use realfft::RealFftPlanner;
 use realfft::num_complex::Complex;
 use serde::{Deserialize, Serialize};
 use spts::Session;
 use spts::data::SessionSet;
+use spts::session::Event;
 use spts_circuit::{Mode, Recording, Slip};
 use spts_recon::metrics::median;
-use std::ops::RangeInclusive;
+use spts_recon::statistics::Sample;
+use std::ops::{Range, RangeInclusive};
 
 /// Most taxels of a skin whose recordings are checked: the search takes time with the square of their number.
 const MOST_TAXELS: usize = 1024;
@@ -46,6 +53,28 @@ pub struct SessionSlip {
     /// Where its samples begin to lag, and by how many rows.
     #[serde(flatten)]
     pub slip: Slip,
+}
+
+/// A contact of a ball whose samples fit no rows. It is not scored: its samples count as lost.
+#[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
+pub struct UnalignedContact {
+    /// Name of the session.
+    pub session: String,
+    /// Block of the recording, from 0.
+    pub block: usize,
+    /// First measurement of the contact.
+    pub from: usize,
+    /// One past its last measurement.
+    pub to: usize,
+}
+
+/// What was found of the rows of a set of sessions.
+#[derive(Debug, Clone, PartialEq, Eq, Default)]
+pub struct Alignment {
+    /// Where samples lag behind their rows; they have been realigned.
+    pub slips: Vec<SessionSlip>,
+    /// Contacts that fit no rows.
+    pub unaligned: Vec<UnalignedContact>,
 }
 
 /// The slips of `recording`, in order of block and measurement; empty if there are none. If a block lags at its first
@@ -61,21 +90,49 @@ pub fn find_slips(recording: &Recording) -> Vec<Slip> {
     tracker.slips
 }
 
-/// Realigns the compressive recordings of `set` where they slip, and returns the slips.
-pub fn follow_slips(set: &mut SessionSet) -> Vec<SessionSlip> {
+/// Realigns the compressive recordings of `set` where they slip, and returns the slips. Contacts of drops that fit no
+/// rows are returned, too; their samples count as lost.
+pub fn follow_slips(set: &mut SessionSet) -> Alignment {
     let follow = |session: &mut Session| {
         let Some(recorded) = &mut session.compressive else {
-            return Vec::new();
+            return Alignment::default();
         };
-        let slips = find_slips(&recorded.recording);
+        let (slips, unaligned) = match session.event {
+            Event::Drop => contact_slips(&recorded.recording),
+            Event::Press | Event::Touch => (find_slips(&recorded.recording), Vec::new()),
+        };
+        if !unaligned.is_empty() {
+            recorded.recording = recorded.recording.without(&unaligned);
+        }
         if !slips.is_empty() {
             recorded.recording = recorded.recording.realigned(&slips);
         }
-        let named = slips.into_iter().map(|slip| SessionSlip { session: session.name.clone(), slip });
-        named.collect()
+        let name = &session.name;
+        let slips = slips.into_iter().map(|slip| SessionSlip { session: name.clone(), slip });
+        let unaligned = unaligned.into_iter().map(|(block, range)| UnalignedContact {
+            session: name.clone(),
+            block,
+            from: range.start,
+            to: range.end,
+        });
+        Alignment { slips: slips.collect(), unaligned: unaligned.collect() }
     };
-    let found: Vec<Vec<SessionSlip>> = set.sessions.par_iter_mut().map(follow).collect();
-    found.concat()
+    let found: Vec<Alignment> = set.sessions.par_iter_mut().map(follow).collect();
+    let mut all = Alignment::default();
+    for one in found {
+        all.slips.extend(one.slips);
+        all.unaligned.extend(one.unaligned);
+    }
+    all
+}
+
+/// One line that lists contacts that fit no rows; `None` without one.
+pub fn unaligned_text(contacts: &[UnalignedContact]) -> Option<String> {
+    let each = contacts.iter().map(|UnalignedContact { session, block, from, to }| {
+        format!("{session} (measurements {from} to {to} of block {block})")
+    });
+    let each: Vec<String> = each.collect();
+    (!each.is_empty()).then(|| format!("contacts whose samples fit no rows are not scored: {}", each.join(", ")))
 }
 
 /// One line that lists the sessions that slip, by how many rows, and from where; `None` without slips.
@@ -117,17 +174,23 @@ const FITTED: usize = 4;
 /// more than twenty standard deviations apart. A fit decides between the best of them; of equal ones, that nearest
 /// to `expected`.
 fn search(chunk: &Chunk<'_>, lags: RangeInclusive<i64>, expected: i64) -> Option<Fit> {
+    let far = |lag: i64| (lag - expected).abs();
+    let fits = candidates(chunk, lags, expected).into_iter().take(FITTED).filter_map(|lag| chunk.fit(lag));
+    fits.min_by(|a, b| a.residual.total_cmp(&b.residual).then(far(a.rows).cmp(&far(b.rows))))
+}
+
+/// The lags by ‖Φᵀy‖², the largest first; of equal ones that nearest to `expected`.
+fn candidates(chunk: &Chunk<'_>, lags: RangeInclusive<i64>, expected: i64) -> Vec<i64> {
     let (least, most) = (*lags.start(), *lags.end());
     // rows from that of the largest lag on; before the first row of all there are none
-    let most = (least..=most).rev().find(|lag| chunk.rows(*lag, 0).is_some())?;
-    let more = usize::try_from(most - least).ok()?;
-    let rows = chunk.rows(most, more)?;
+    let Some(most) = (least..=most).rev().find(|lag| chunk.rows(*lag, 0).is_some()) else { return Vec::new() };
+    let more = usize::try_from(most - least).unwrap_or(0);
+    let Some(rows) = chunk.rows(most, more) else { return Vec::new() };
     let energies = correlation_energies(&rows.to_vec(), rows.taxels(), &chunk.y);
     let mut scores: Vec<(f64, i64)> = energies.into_iter().zip((least..=most).rev()).collect();
     let far = |lag: i64| (lag - expected).abs();
     scores.sort_by(|a, b| b.0.total_cmp(&a.0).then(far(a.1).cmp(&far(b.1))));
-    let fits = scores.iter().take(FITTED).filter_map(|&(_, lag)| chunk.fit(lag));
-    fits.min_by(|a, b| a.residual.total_cmp(&b.residual).then(far(a.rows).cmp(&far(b.rows))))
+    scores.into_iter().map(|(_, lag)| lag).collect()
 }
 
 /// ‖Φᵀy‖² for every row of `phi` at which Φ can begin, times a constant; `phi` has `taxels` weights a row.
@@ -160,6 +223,69 @@ fn correlation_energies(phi: &[f64], taxels: usize, y: &[f64]) -> Vec<f64> {
         energies.iter_mut().zip(&values).for_each(|(energy, part)| *energy += part * part);
     }
     energies
+}
+
+/// Wrong rows that a contact is fitted at: how many, from which lag on, and how far apart.
+const WRONG: (i64, i64, i64) = (12, -4 * REACH, 61);
+/// Standard deviations below the mean of wrong rows at which the expected rows are the right ones, and others are: of
+/// a thousand wrong ones the best lies 3.2 below.
+const KEPT_SD: f64 = 3.0;
+const FOUND_SD: f64 = 5.0;
+/// Lags of a contact whose images are fitted: those with the largest ‖Φᵀy‖².
+const CANDIDATES: usize = 12;
+
+/// Slips of a recording of drops, contact by contact, in order, and the contacts that fit no rows, as block and range
+/// of measurements. A slip is given from the end of the contact before it on. Contacts of less than 1.5 measurements a
+/// taxel fit any rows and are left as they are, as are raster scans, several wires, and skins of more than 1024 taxels.
+pub fn contact_slips(recording: &Recording) -> (Vec<Slip>, Vec<(usize, Range<usize>)>) {
+    let (mut slips, mut unaligned) = (Vec::new(), Vec::new());
+    let (taxels, wires) = (recording.taxels(), recording.weights().wire_count());
+    if recording.mode() != Mode::Compressive || taxels > MOST_TAXELS || wires > 1 {
+        return (slips, unaligned);
+    }
+    let mut lag = 0;
+    // block and end of the contact before
+    let mut before = (usize::MAX, 0);
+    for RecordedBounce { block, start, end, .. } in find_bounces(recording) {
+        if 2 * (end - start) < 3 * taxels {
+            continue;
+        }
+        if before.0 != block {
+            before = (block, 0);
+            if lag != 0 {
+                slips.push(Slip { block, from: 0, rows: lag });
+            }
+        }
+        let chunk = Chunk::new(recording, block, start, end - start);
+        let (count, first, step) = WRONG;
+        let wrong = (0..count).filter_map(|k| chunk.residual(lag + first - step * k));
+        let Some(wrong) = Sample::of(&wrong.collect::<Vec<f64>>()) else { continue };
+        let limit = |sds: f64| wrong.mean - sds * wrong.variance.sqrt();
+        let kept = chunk.residual(lag).is_some_and(|left| left < limit(KEPT_SD));
+        if !kept {
+            let lags = (lag - REACH).min(-REACH)..=(lag + REACH).max(REACH);
+            let residuals = candidates(&chunk, lags, lag).into_iter().take(CANDIDATES);
+            let residuals = residuals.filter_map(|lag| Some((lag, chunk.residual(lag)?)));
+            let found = residuals.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|(_, left)| *left < limit(FOUND_SD));
+            match found {
+                Some((rows, _)) => {
+                    lag = rows;
+                    slips.push(Slip { block, from: before.1, rows });
+                }
+                None => unaligned.push((block, start..end)),
+            }
+        }
+        before.1 = end;
+    }
+    // where a slip is found at the first contact of a block, the one carried over is replaced
+    slips.dedup_by(|next, slip| {
+        let same = (next.block, next.from) == (slip.block, slip.from);
+        if same {
+            slip.rows = next.rows;
+        }
+        same
+    });
+    (slips, unaligned)
 }
 
 /// Lags that are searched: as far as this from none and from the one that was last found.

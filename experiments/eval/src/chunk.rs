@@ -2,6 +2,8 @@
 
 use crate::windows::{compressive_wires, wire_means};
 use spts_circuit::{Recording, WeightRows};
+use spts_recon::MatrixView;
+use spts_recon::recover::LeastSquares;
 
 /// Steps of the conjugate gradients. L rows of N = L/4 random signs have a condition number of 9, so that a step halves
 /// the error.
@@ -105,6 +107,23 @@ impl<'a> Chunk<'a> {
         }
         let scale = square * self.energy;
         if scale > 0.0 { both.max(0.0).powi(2) / scale } else { 0.0 }
+    }
+
+    /// Root mean square that an image without a value below zero leaves of the output if the chunk lags by `rows`, divided
+    /// by that of the output, on one wire; `None` before the first row of all, without output, or where no image is determined.
+    pub(crate) fn residual(&self, rows: i64) -> Option<f64> {
+        let taxels = self.recording.taxels();
+        let phi = self.rows(rows, 0)?.to_vec();
+        let mut fit = LeastSquares::new(taxels, 1);
+        let y = self.y.iter().zip(&self.lost).map(|(y, lost)| if *lost { f64::NAN } else { *y });
+        let y: Vec<f64> = y.collect();
+        fit.add(MatrixView::new(y.len(), taxels, &phi).ok()?, &[], &y);
+        let image = fit.solve().ok()?;
+        let left = phi.chunks_exact(taxels).zip(&y).map(|(row, y)| y - dot(row, &image));
+        let left: Vec<f64> = left.filter(|v| v.is_finite()).collect();
+        let mean = left.iter().sum::<f64>() / left.len().max(1) as f64;
+        let square: f64 = left.iter().map(|v| (v - mean).powi(2)).sum();
+        (self.energy > 0.0).then(|| (square / self.energy).sqrt())
     }
 
     /// Least squares for an image and a constant for every wire, by conjugate gradients, if the chunk lags by `rows`;

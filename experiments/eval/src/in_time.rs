@@ -105,7 +105,7 @@ impl TrainedBoard<'_> {
     /// # Errors
     /// [`Refusal`] for a decoder without a Gaussian prior, or if a window cannot be processed.
     pub fn in_time(&self, done: &(dyn Fn() + Sync)) -> Result<InTimeBoard, Refusal> {
-        if self.run.sessions.is_empty() && self.source.bounces.is_none() {
+        if self.run.sessions.is_empty() && self.source.drops.is_empty() {
             return Err(no_session(self.source));
         }
         for entry in &self.entries {
@@ -124,8 +124,8 @@ impl TrainedBoard<'_> {
             let contact = press(self.run.sessions[session], block);
             contact.map_or_else(|| Ok(Vec::new()), |contact| all(&contact, session))
         })?;
-        let ball = self.source.bounces.as_ref().filter(|_| self.scores_places());
-        let balls = ball.map_or_else(Vec::new, |ball| drops(ball, cols));
+        let recordings = self.source.drops.iter().filter(|_| self.scores_places());
+        let balls: Vec<FollowedContact> = recordings.flat_map(|(_, recording)| drops(recording, cols)).collect();
         let dropped = balls.par_iter().map(|contact| all(contact, 0));
         let dropped = dropped.collect::<Result<Vec<_>, Refusal>>()?;
         let mut board = InTimeBoard::default();

@@ -30,7 +30,9 @@ pub mod training;
 mod truth;
 mod windows;
 
-pub use alignment::{SessionSlip, find_slips, follow_slips, slips_text};
+pub use alignment::{
+    Alignment, SessionSlip, UnalignedContact, contact_slips, find_slips, follow_slips, slips_text, unaligned_text,
+};
 pub use decoders::RASTER;
 pub use labels::Labels;
 pub use published::{BaselineRow, ScoreRow, SkinScores, baselines, mean_rows, score_raster, score_sessions};

@@ -2,7 +2,7 @@
 
 use crate::board::{Entry, Run};
 use crate::decoders::{RASTER, TrainedDecoder, published_decodes};
-use crate::place::{LocalisationRow, PlaceRow, localise, places};
+use crate::place::{BALL, LocalisationRow, PlaceRow, localise, places};
 use crate::protocol::Truth;
 use crate::sensing::Sensing;
 use crate::session::ScoredSession;
@@ -79,7 +79,7 @@ impl ScoredSkin {
             return Ok(Vec::new());
         };
         let shifted = self.learned.shifted.clone();
-        places(recording, shifted, self.learned.cols, measurements, &[Sensing::Random])
+        places(BALL, recording, shifted, self.learned.cols, measurements, &[Sensing::Random])
     }
 }
 

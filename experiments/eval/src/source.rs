@@ -1,6 +1,6 @@
 //! Sessions for scoring or training: of the real skin or of the twin.
 
-use crate::alignment::{SessionSlip, follow_slips};
+use crate::alignment::{Alignment, follow_slips};
 use crate::labels::Labels;
 use crate::protocol::Truth;
 use crate::session::ScoredSession;
@@ -22,8 +22,8 @@ pub struct Source {
     pub root: PathBuf,
     /// Sessions of presses, all of one skin.
     pub sessions: Vec<ScoredSession>,
-    /// Recording of the bouncing ball.
-    pub bounces: Option<Recording>,
+    /// Recordings of a bouncing ball, with the names of their sessions.
+    pub drops: Vec<(String, Recording)>,
     /// Recordings of touches at unknown times, with the names of their sessions.
     pub touches: Vec<(String, Recording)>,
     /// Dictionary and library published with them.
@@ -36,8 +36,8 @@ pub struct Source {
     pub layout: SkinLayout,
     /// Numbers of the classes.
     pub labels: Labels,
-    /// Slips of the recordings, which have been realigned.
-    pub slips: Vec<SessionSlip>,
+    /// Slips of the recordings, which have been realigned, and contacts that fit no rows.
+    pub alignment: Alignment,
     /// As [`SessionSet::note`].
     pub note: Option<String>,
 }
@@ -86,36 +86,26 @@ impl Source {
     /// # Errors
     /// [`Refusal`] for a session with nothing to score, or of another skin than the first.
     pub fn new(mut set: SessionSet) -> Result<Self, Refusal> {
-        let slips = follow_slips(&mut set);
-        let bounces = set.drops().cloned();
-        let SessionSet { root, sessions, published, mut missing, mut note } = set;
-        let dropped: Vec<&str> = sessions.iter().filter(|s| s.event == Event::Drop).map(|s| s.name.as_str()).collect();
-        if let [first, others @ ..] = &dropped[..]
-            && !others.is_empty()
-        {
-            let said = format!("of drops those of {first:?} alone are located, not those of {}", others.join(", "));
-            note = Some(note.map_or_else(|| said.clone(), |note| format!("{note}\n{said}")));
-        }
+        let alignment = follow_slips(&mut set);
+        let SessionSet { root, sessions, published, mut missing, note } = set;
         let simulated = sessions.iter().all(|s| s.provenance.is_some());
         let (presses, others): (Vec<Session>, Vec<Session>) =
             sessions.into_iter().partition(|s| s.event == Event::Press);
         let layout = presses.iter().find_map(|s| s.layout().copied());
-        let layout = layout.or(bounces.as_ref().map(|b| *b.layout())).unwrap_or_default();
+        let of = |event: Event| others.iter().filter(move |s| s.event == event);
+        let recordings = |event: Event| of(event).filter_map(|s| Some((s.name.clone(), s.compressive()?.clone())));
+        let layout = layout.or_else(|| recordings(Event::Drop).next().map(|(_, drops)| *drops.layout()));
+        let layout = layout.unwrap_or_default();
         let labels = Labels::of(presses.iter().map(|s| s.object.as_str()));
         for session in &presses {
             check_session(&root, session, &layout)?;
         }
         let shape = |layout: &SkinLayout| (layout.rows(), layout.cols());
-        let bounces = bounces.filter(|drops| {
-            let fits = shape(drops.layout()) == shape(&layout);
-            if !fits {
-                missing.push("bouncing ball: drops on the skin of the presses".to_owned());
-            }
-            fits
-        });
-        let touches = others.iter().filter(|s| s.event == Event::Touch);
-        let touches = touches.filter_map(|s| Some((s.name.clone(), s.compressive()?.clone())));
-        let touches = touches.filter(|(_, touches)| shape(touches.layout()) == shape(&layout)).collect();
+        let fits = |(_, recording): &(String, Recording)| shape(recording.layout()) == shape(&layout);
+        let (drops, elsewhere): (Vec<_>, Vec<_>) = recordings(Event::Drop).partition(fits);
+        let names = elsewhere.iter().map(|(name, _)| format!("{name}: drops on the skin of the presses"));
+        missing.extend(names);
+        let touches = recordings(Event::Touch).filter(fits).collect();
         let mut scored: Vec<ScoredSession> = Vec::with_capacity(presses.len());
         for session in presses {
             let label = labels.number(&session.object).unwrap_or_default();
@@ -125,7 +115,7 @@ impl Source {
             scored.push(ScoredSession { again, shared_raster, ..session });
         }
         let sessions = scored;
-        Ok(Self { sessions, root, bounces, touches, published, missing, simulated, layout, labels, slips, note })
+        Ok(Self { sessions, root, drops, touches, published, missing, simulated, layout, labels, alignment, note })
     }
 
     /// The same, scored against raster scans as recordings of the real skin are, and not against what a simulation
@@ -191,7 +181,8 @@ impl Source {
         }
         let cols = self.layout.cols();
         let learned = Learned::new(published.dictionary, published.shifted, published.library, cols);
-        let skin = ScoredSkin { sessions: self.sessions, bounces: self.bounces, learned };
+        let bounces = self.drops.into_iter().next().map(|(_, recording)| recording);
+        let skin = ScoredSkin { sessions: self.sessions, bounces, learned };
         Ok(PublishedSkin { skin, missing: self.missing })
     }
 }

@@ -59,20 +59,20 @@ pub(crate) type ScoreColumn<T> = (&'static str, fn(&T) -> Option<f64>);
 
 impl Scores {
     /// Columns in files.
-    pub(crate) const COLUMNS: [ScoreColumn<Self>; 12] = [
+    pub(crate) const COLUMNS: [ScoreColumn<Self>; 9] = [
         ("support", |s| s.support),
         ("iou", |s| s.iou),
-        ("ceiling", |s| s.ceiling),
         ("f1", |s| s.f1),
         ("cosine", |s| s.cosine),
         ("jaccard", |s| s.jaccard),
-        ("truth_error", |s| s.truth_error),
         ("iou_raster", |s| s.iou_raster),
-        ("ceiling_raster", |s| s.ceiling_raster),
         ("class_single", |s| s.class_single),
         ("class_vote20", |s| s.class_vote20),
         ("class_evidence", |s| s.class_evidence),
     ];
+    /// Columns in files that say how good the truth is, whatever the decoder.
+    pub(crate) const TRUTH: [ScoreColumn<Self>; 3] =
+        [("ceiling", |s| s.ceiling), ("truth_error", |s| s.truth_error), ("ceiling_raster", |s| s.ceiling_raster)];
 }
 
 /// Scores of the windows of one press by one decoder and M.

@@ -13,9 +13,9 @@ pub use against::{Difference, Regression, differences, regressions};
 pub use table::{table, write};
 
 use crate::algorithm::{Contender, DecodeError};
-use crate::alignment::SessionSlip;
+use crate::alignment::{Alignment, SessionSlip, UnalignedContact};
 use crate::decoders::{DecoderSpec, Needs};
-use crate::place::{PlaceRow, places, touch_places};
+use crate::place::{BALL, PlaceRow, places, touch_places};
 use crate::scorer::{ScoredPress, Scorer, decode_us};
 use crate::sensing::{RowChooser, Sensing};
 use crate::session::ScoredSession;
@@ -80,8 +80,9 @@ impl TrainedBoard<'_> {
     /// [`Refusal`].
     pub fn score(&self, done: &(dyn Fn() + Sync)) -> Result<ScoreBoard, Refusal> {
         let (rows, objects) = self.run.score(&self.entries, done)?;
-        let slips = self.source.slips.clone();
-        Ok(ScoreBoard { version: ScoreBoard::VERSION, rows, objects, slips, ..ScoreBoard::default() })
+        let Alignment { slips, unaligned } = self.source.alignment.clone();
+        let version = ScoreBoard::VERSION;
+        Ok(ScoreBoard { version, rows, objects, slips, unaligned, localisation: Vec::new() })
     }
 
     /// Results for the bouncing ball and for touches. Without a ball, there are none of locators with a dictionary;
@@ -96,10 +97,13 @@ impl TrainedBoard<'_> {
         for (name, touches) in self.source.touches.iter().filter(|_| !measurements.is_empty()) {
             rows.extend(touch_places(name, touches, shifted.as_ref(), measurements)?);
         }
-        if let (Some(bounces), Some(shifted)) = (&self.source.bounces, shifted) {
-            let cols = self.source.layout.cols();
-            let ball = places(bounces, shifted, cols, measurements, &self.settings.sensing)?;
-            rows.splice(..0, ball);
+        if let Some(shifted) = shifted {
+            let (cols, drops) = (self.source.layout.cols(), &self.source.drops);
+            let each = drops.iter().map(|(name, recording)| {
+                let name = if drops.len() > 1 { name } else { BALL };
+                places(name, recording, shifted.clone(), cols, measurements, &self.settings.sensing)
+            });
+            rows.splice(..0, each.collect::<Result<Vec<_>, Refusal>>()?.concat());
         }
         Ok(rows)
     }
@@ -149,7 +153,7 @@ impl BoardSettings {
             entries = trainer.entries(&sessions)?;
             // locators learn, which nothing can on a large skin without scans
             let large = source.layout.taxels() > TrainingData::MOST_TAXELS && !source.learns();
-            if (touches || places && source.bounces.is_some()) && !large {
+            if (touches || places && !source.drops.is_empty()) && !large {
                 dictionary = Some(trainer.dictionary()?);
             }
         }
@@ -458,6 +462,9 @@ pub struct ScoreBoard {
     /// Slips of the recordings, which were realigned before scoring.
     #[serde(default)]
     pub slips: Vec<SessionSlip>,
+    /// Contacts of drops that fit no rows, which are not scored.
+    #[serde(default)]
+    pub unaligned: Vec<UnalignedContact>,
 }
 
 impl ScoreBoard {

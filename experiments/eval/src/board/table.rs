@@ -23,6 +23,7 @@ pub fn write(board: &ScoreBoard, out: &mut OutputFolder) -> Result<(), Refusal> 
         .file("object", |r| &r.object)
         .file("truth", |r| r.truth.map(TruthKind::name))
         .files(&Scores::COLUMNS, |r| &r.scores)
+        .files(&Scores::TRUTH, |r| &r.scores)
         .interval("iou", |r| r.iou_ci)
         .interval("class_single", |r| r.class_single_ci)
         .write(out)?;
@@ -47,6 +48,7 @@ fn rows<'a>(rows: impl IntoIterator<Item = &'a BoardRow>) -> Table<'a, &'a Board
     let rows_with_remarks = rows.iter().any(|r| r.too_slow == Some(true) || r.failed > 0);
     let mut table = keyed(Table::new("board", rows), |r: &BoardRow| &r.key)
         .files(&Scores::COLUMNS, |r| &r.scores)
+        .files(&Scores::TRUTH, |r| &r.scores)
         .file("look_up", |r| r.look_up)
         .file("worst_object", |r| r.worst_object.as_deref())
         .file("worst_iou", |r| r.worst_iou)

@@ -46,12 +46,13 @@ pub(crate) fn localise(
     Ok(found.into_iter().map(row).collect())
 }
 
-/// Rows of every locator at every M of `measurements`, as recorded and relabelled, by windows of every kind of
-/// `sensing`.
+/// Rows of every locator at every M of `measurements` for the drops `name`, as recorded and relabelled, by windows of
+/// every kind of `sensing`.
 ///
 /// # Errors
 /// [`Refusal`] when the sheet is no grid of `cols` columns, or when no rows can be chosen.
 pub(crate) fn places(
+    name: &str,
     recording: &Recording,
     shifted: Matrix,
     cols: usize,
@@ -60,7 +61,7 @@ pub(crate) fn places(
 ) -> Result<Vec<PlaceRow>, Refusal> {
     let asked = PlacesRequest { relabelled: true, sensing, ..PlacesRequest::new(measurements, |name| name != TAXEL) };
     let tools = Tools::new(recording, shifted, cols)?;
-    let found = asked.locate(BALL, &tools, &bounces(recording, tools.shape))?;
+    let found = asked.locate(name, &tools, &bounces(recording, tools.shape))?;
     Ok(found.into_iter().map(|(row, _)| row).collect())
 }
 
@@ -273,7 +274,7 @@ impl Contact {
 }
 
 /// The contact of rows that do not say it.
-const BALL: &str = "ball";
+pub(crate) const BALL: &str = "ball";
 
 fn ball() -> String {
     BALL.to_owned()

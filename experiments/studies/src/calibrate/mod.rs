@@ -68,7 +68,7 @@ pub struct SessionPair {
 /// [`WINDOW_FRAMES`]; or if there is no session.
 pub fn read(root: &Path) -> Result<Vec<SessionPair>, Refusal> {
     let mut set = SessionSet::open(root)?;
-    let slips = follow_slips(&mut set);
+    let slips = follow_slips(&mut set).slips;
     let mut pairs = Vec::new();
     for session in set.presses() {
         let Some(recorded) = &session.compressive else {
