@@ -123,8 +123,8 @@ fn external_programs_are_scored_or_named() {
 }
 
 /// Least squares on all samples of a press, against a raster frame of another press: what an independent analysis in
-/// numpy reached (IoU, to two digits), without the bound at zero, which changes taxels near the threshold. Halves of a
-/// press agree, and intervals are as wide as the objects are apart.
+/// numpy reached (IoU, to two digits, without the bound at zero). Halves of a press agree, and intervals are as wide as
+/// the objects are apart.
 #[test]
 fn a_press_is_its_own_truth() {
     let dir = tempfile::tempdir().unwrap();
@@ -136,8 +136,8 @@ fn a_press_is_its_own_truth() {
         let object = objects.iter().find(|o| o["object"] == name).unwrap();
         let number = |key: &str| object[key].as_f64().unwrap();
         assert_eq!(object["truth"], "press");
-        assert!(number("ceiling") > 0.93 && number("truth_error") < 0.01, "{object}");
-        assert!((number("ceiling_raster") - by_raster).abs() < 0.025, "{object}");
+        assert!(number("ceiling") > 0.9 && number("truth_error") < 0.01, "{object}");
+        assert!((number("ceiling_raster") - by_raster).abs() < 0.01, "{object}");
         assert!(number("cosine") > number("jaccard") && number("iou") > number("iou_raster"), "{object}");
     }
     let mean = row(&board, "nn_lmmse", 20, true);

@@ -1,6 +1,6 @@
 """Figure of a board that `spts score --left-out` has written: `python3 learning_figure.py board.json figure.png [M]`.
 
-Left, IoU against M with 95 % intervals over presses; right, a bar an object at M (20). Only scores on objects that the
+Left, IoU against M with 95 % intervals over objects; right, a bar an object at M (20). Only scores on objects that the
 decoder has not learned from. Needs matplotlib.
 """
 

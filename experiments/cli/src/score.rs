@@ -38,17 +38,17 @@ use std::time::Duration;
 /// same true image: the conductances of the press where a simulation knows them; else the non-negative least-squares
 /// image of the same press, from all samples of the hold but those of the window (of as many as eight a taxel); else
 /// one frame of a raster scan of another press, which is how the publication scores. The ceiling is the IoU that such a
-/// truth itself reaches. If a session has fewer than 15 presses, all are scored. Of a longer session, ten presses are scored; those before
-/// them condition the skin.
+/// truth itself reaches. If a session has fewer than 15 presses, all are scored. Of a longer session, ten presses are
+/// scored; those before them condition the skin.
 ///
 /// The scores are: IoU of the supports (the taxels above 23 % of the maximum), with the 95 % interval over objects,
 /// their sessions and presses, and the object with the lowest; cosine and weighted Jaccard index of the images, which
-/// have no threshold; IoU by the raster frame; support accuracy and F1; the share of correct classes of single windows, of votes
-/// of 20 windows, and of evidence added up over 20 windows; the time of a decode on one thread, beside the time in
-/// which the measurements arrive; and the error of the place of the bouncing ball and of touches, such as those of the
-/// skin around a robot's arm. The ball's place is scored as recorded, where all drops fall on the middle of the skin,
-/// and with the taxels renumbered so that the contact moves over the whole skin. A bent skin has an output even without
-/// a touch; the output of the frames before the touch is subtracted.
+/// have no threshold; IoU by the raster frame; support accuracy and F1; the share of correct classes of single windows,
+/// of votes of 20 windows, and of evidence added up over 20 windows; the time of a decode on one thread, beside the
+/// time in which the measurements arrive; and the error of the place of the bouncing ball and of touches, such as those
+/// of the skin around a robot's arm. The ball's place is scored as recorded, where all drops fall on the middle of the
+/// skin, and with the taxels renumbered so that the contact moves over the whole skin. A bent skin has an output even
+/// without a touch; the output of the frames before the touch is subtracted.
 ///
 /// Nothing is learned from a compressive measurement: dictionaries, priors and templates come from raster presses that
 /// are not scored. There is one exception, which the published evaluation has too: the published library holds raster

@@ -109,8 +109,9 @@ impl<'a> Chunk<'a> {
         if scale > 0.0 { both.max(0.0).powi(2) / scale } else { 0.0 }
     }
 
-    /// Root mean square that an image without a value below zero leaves of the output if the chunk lags by `rows`, divided
-    /// by that of the output, on one wire; `None` before the first row of all, without output, or where no image is determined.
+    /// Root mean square that an image without a value below zero leaves of the output if the chunk lags by `rows`,
+    /// divided by that of the output, on one wire; `None` before the first row of all, without output, or where no
+    /// image is determined.
     pub(crate) fn residual(&self, rows: i64) -> Option<f64> {
         let taxels = self.recording.taxels();
         let phi = self.rows(rows, 0)?.to_vec();

@@ -7,8 +7,8 @@
 //! longer window with as many samples as there are taxels. [`crate::board::TrainedBoard::in_time`] trains the decoders.
 //!
 //! The true support of a press is that of the least-squares image of the samples after the window, which no decoder has
-//! used; during the hold of a simulated press it is that of what the taxels conduct. The ground truth of a drop is the least-squares image
-//! of the whole contact, as for places; it includes the decoded samples.
+//! used; during the hold of a simulated press it is that of what the taxels conduct. The ground truth of a drop is the
+//! least-squares image of the whole contact, as for places; it includes the decoded samples.
 
 use crate::algorithm::DecodeError;
 use crate::board::{Entry, TrainedBoard, no_session};

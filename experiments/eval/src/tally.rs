@@ -264,9 +264,9 @@ pub(crate) fn intervals(sessions: &[Vec<Tally>], objects: &[usize]) -> [Option<[
 }
 
 /// 95 % intervals of what `score` makes of the presses of all sessions, session i being one of the object numbered
-/// `objects[i]`: percentiles over [`RESAMPLES`] draws. Each draws as many objects as there are with replacement, then of
-/// each of them its sessions, then of each of these its presses (A. Davison, D. Hinkley, *Bootstrap Methods and their
-/// Application* (1997), §3.8). With one object, the interval is over its sessions and presses. Windows of a press
+/// `objects[i]`: percentiles over [`RESAMPLES`] draws. Each draws as many objects as there are with replacement, then
+/// of each of them its sessions, then of each of these its presses (A. Davison, D. Hinkley, *Bootstrap Methods and
+/// their Application* (1997), §3.8). With one object, the interval is over its sessions and presses. Windows of a press
 /// resemble each other, and so do the presses of an object: what is claimed of objects has to vary them. A score that
 /// is missing once has no interval.
 pub(crate) fn bootstrap<T, const K: usize>(
