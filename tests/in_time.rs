@@ -47,7 +47,7 @@ fn simulated_presses_gain() {
 /// Two objects of the real skin, each left out, and its ball, by windows of 10 samples. A study of its own in numpy,
 /// on presses that are not scored, found an IoU of .80 to .91 in time and .40 to .58 alone during the rise, by windows
 /// of 20; and the place of the ball within .5 taxels from the third millisecond on. The bounds are the outer ends of
-/// 95 % intervals over presses and drops.
+/// 95 % intervals over objects and drops.
 #[test]
 fn the_real_skin_gains_in_rise_and_hold_and_on_drops() {
     let dir = tempfile::tempdir().unwrap();

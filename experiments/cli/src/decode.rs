@@ -15,7 +15,8 @@ use spts_eval::decode::{DecodeRequest, DecodedSession, DecodedWindow, LearnedDec
 use spts_eval::decoders::{AUTO, auto, short_label};
 use spts_eval::training::TrainingData;
 use spts_eval::{
-    Alignment, Labels, SessionSlip, Source, Table, check_session, follow_slips, slips_text, unaligned_text, unique,
+    Alignment, Labels, SessionSlip, Source, Table, UnalignedContact, check_session, follow_slips, slips_text,
+    unaligned_text, unique,
 };
 use spts_models::{SkinLayout, Streams};
 use std::path::{Path, PathBuf};
@@ -25,8 +26,8 @@ use std::path::{Path, PathBuf};
 /// SESSION is a folder with session.json, as `spts simulate` leaves one, a folder of such folders, or recordings of the
 /// real skin. Each session is decoded with its own rows of weights, whatever its layout. The decoders learn from raster
 /// presses that are not scored. Where there are none, they use a prior made for the layout: random shapes anywhere on
-/// it. Scores are given where the truth is known: the conductances of the same press, else the raster scan of another
-/// press of the object.
+/// it. Scores are given where the truth is known, as by `spts score`: the conductances of the press, else the
+/// least-squares image of its own hold without the samples of the window, else a raster scan of another press.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts simulate press/T --out out/T && spts decode out/T
@@ -107,8 +108,9 @@ impl DecodeCommand {
                 check_session(&self.session, session, layout)?;
             }
         }
-        let shown = |slip: &SessionSlip| sessions.iter().any(|session| session.name == slip.session);
-        let slips: Vec<SessionSlip> = slips.into_iter().filter(shown).collect();
+        let shown = |name: &str| sessions.iter().any(|session| session.name == name);
+        let slips: Vec<SessionSlip> = slips.into_iter().filter(|slip| shown(&slip.session)).collect();
+        let unaligned: Vec<UnalignedContact> = unaligned.into_iter().filter(|c| shown(&c.session)).collect();
         notes(slips_text(&slips).iter().chain(&unaligned_text(&unaligned)));
         let bars = Bars::default();
         bars.stage("learning", None);

@@ -36,10 +36,10 @@ use std::time::Duration;
 ///
 /// Every decoder sees the same windows of M consecutive measurements of the scored presses, and is scored against the
 /// same true image: the conductances of the press where a simulation knows them; else the non-negative least-squares
-/// image of the same press, from all samples of the hold but those of the window (of as many as eight a taxel); else
-/// one frame of a raster scan of another press, which is how the publication scores. The ceiling is the IoU that such a
-/// truth itself reaches. If a session has fewer than 15 presses, all are scored. Of a longer session, ten presses are
-/// scored; those before them condition the skin.
+/// image of the same press, from all samples of the hold but those of the window (if there are eight a taxel, on at
+/// most 600 taxels); else one frame of a raster scan of another press, which is how the publication scores. The ceiling
+/// is the IoU that such a truth itself reaches. If a session has fewer than 15 presses, all are scored. Of a longer
+/// session, ten presses are scored; those before them condition the skin.
 ///
 /// The scores are: IoU of the supports (the taxels above 23 % of the maximum), with the 95 % interval over objects,
 /// their sessions and presses, and the object with the lowest; cosine and weighted Jaccard index of the images, which

@@ -250,14 +250,15 @@ pub fn contact_slips(recording: &Recording) -> (Vec<Slip>, Vec<(usize, Range<usi
     // block and end of the contact before
     let mut before = (usize::MAX, 0);
     for RecordedBounce { block, start, end, .. } in find_bounces(recording) {
-        if 2 * (end - start) < 3 * taxels {
-            continue;
-        }
         if before.0 != block {
             before = (block, 0);
             if lag != 0 {
                 slips.push(Slip { block, from: 0, rows: lag });
             }
+        }
+        let from = std::mem::replace(&mut before.1, end);
+        if 2 * (end - start) < 3 * taxels {
+            continue;
         }
         let chunk = Chunk::new(recording, block, start, end - start);
         let (count, first, step) = WRONG;
@@ -273,12 +274,11 @@ pub fn contact_slips(recording: &Recording) -> (Vec<Slip>, Vec<(usize, Range<usi
             match found {
                 Some((rows, _)) => {
                     lag = rows;
-                    slips.push(Slip { block, from: before.1, rows });
+                    slips.push(Slip { block, from, rows });
                 }
                 None => unaligned.push((block, start..end)),
             }
         }
-        before.1 = end;
     }
     // where a slip is found at the first contact of a block, the one carried over is replaced
     slips.dedup_by(|next, slip| {

@@ -173,7 +173,7 @@ impl TrainedBoard<'_> {
 
     fn press(&self, stopped: &[Stopped<'_>], session: usize, block: usize) -> Result<Vec<PressStops>, Refusal> {
         let scored = self.run.sessions[session];
-        let Some(press) = ScoredPress::new(scored, block, self.run.most()) else {
+        let Some(press) = ScoredPress::new(scored, block, &self.run.measurements) else {
             return Ok(Vec::new());
         };
         let press = press.with_numbers()?;

@@ -94,7 +94,7 @@ pub struct DecodedSession {
     pub knows_class: bool,
     /// In order of block, decoder, M, window.
     pub rows: Vec<DecodedWindow>,
-    /// True image of every block; `None` where it is not known.
+    /// True image of every block, of all samples of the hold where it is fitted to them; `None` where it is not known.
     pub truth: Vec<Option<Vec<f64>>>,
     /// Measurements of the windows for each M, in order of M, block, window.
     pub measured: Vec<MeasuredWindow>,
@@ -186,7 +186,7 @@ impl DecodeRequest {
         let scored = ScoredSession::new(session.clone(), 0);
         let begins = begins(session, recording, &scored);
         for &m in &self.measurements {
-            for &(start, _) in &begins {
+            for &(start, _) in begins.iter().flatten() {
                 let most = recording.blocks()[0].volts.len() - start;
                 if m == 0 || m * self.windows > most {
                     return Err(too_many(session, m, self.windows, [start, most]));
@@ -195,15 +195,20 @@ impl DecodeRequest {
         }
         let (layout, taxels) = (recording.layout(), recording.taxels());
         let longest = self.measurements.iter().copied().max().unwrap_or(0) * self.windows;
-        let blocks = begins.par_iter().enumerate().map(|(block, &(start, ref untouched))| {
+        let blocks = begins.par_iter().enumerate().map(|(block, begin)| {
+            let Some(&(start, ref untouched)) = begin.as_ref() else {
+                return Ok((Vec::new(), Vec::new(), None));
+            };
             let press = untouched.press(recording, block, start..start + longest);
             let truth = scored.truth(block);
             let hold = scored.protocol.measurements(recording);
             // without the samples of the window, as far as it lies in the hold
             let without = |window: &Window<'_>, at: usize| {
-                let held = hold.start == start && start + at + window.y.len() <= hold.end;
-                truth.as_ref().map(|truth| if held { truth.without([*window]) } else { truth.truth.clone() })
+                let inside = if hold.start == start { hold.end.saturating_sub(start + at) } else { 0 };
+                truth.as_ref()?.without([window.first(inside)])
             };
+            let truths = |m: usize| press.windows(0..m * self.windows, m, m).map(|(at, window)| without(&window, at));
+            let truths: Vec<Vec<Option<Truth>>> = self.measurements.iter().map(|&m| truths(m).collect()).collect();
             let all = |m: usize| press.windows(0..m * self.windows, m, m);
             let measured = self.measurements.iter().flat_map(|&m| all(m)).map(|(at, window)| MeasuredWindow {
                 block,
@@ -217,16 +222,16 @@ impl DecodeRequest {
             let mut rows = Vec::new();
             for (spec, trained) in self.decoders.iter().zip(&learned.trained) {
                 let mut algorithm = trained.start();
-                for &m in &self.measurements {
+                for (&m, truths) in self.measurements.iter().zip(&truths) {
                     let (starts, windows): (Vec<usize>, Vec<Window<'_>>) = all(m).unzip();
                     let answers = algorithm.decode_all(&windows)?;
-                    let answers = starts.iter().zip(&windows).zip(answers);
-                    rows.extend(answers.map(|((&at, window), answer)| DecodedWindow {
+                    let answers = starts.iter().zip(truths).zip(answers);
+                    rows.extend(answers.map(|((&at, truth), answer)| DecodedWindow {
                         window: at / m,
                         decoder: spec.name,
                         m,
                         start: start + at,
-                        ..learned.judged(session, without(window, at).as_ref(), block, answer)
+                        ..learned.judged(session, truth.as_ref(), block, answer)
                     }));
                 }
             }
@@ -281,8 +286,9 @@ impl LearnedDecoders {
 }
 
 /// First measurement of the hold of every block, and the untouched skin before it. It is the first of the contact where
-/// something fell on the skin, or touched one that is under preload.
-fn begins(session: &Session, recording: &Recording, scored: &ScoredSession) -> Vec<(usize, Untouched)> {
+/// something fell on the skin, or touched one that is under preload; `None` in a block of drops without a contact, where
+/// others have one.
+fn begins(session: &Session, recording: &Recording, scored: &ScoredSession) -> Vec<Option<(usize, Untouched)>> {
     let hold = scored.protocol.measurements(recording).start;
     let (mut contacts, mut touches) = (Vec::new(), Vec::new());
     match session.event {
@@ -293,11 +299,14 @@ fn begins(session: &Session, recording: &Recording, scored: &ScoredSession) -> V
     let begin = |block: usize| {
         let preloaded = |touch: &&RecordedTouch| touch.block == block && touch.untouched.image.is_some();
         if let Some(touch) = touches.iter().find(preloaded) {
-            return (touch.start, touch.untouched.clone());
+            return Some((touch.start, touch.untouched.clone()));
         }
         let contact = contacts.iter().find(|contact| contact.block == block);
+        if contact.is_none() && !contacts.is_empty() {
+            return None;
+        }
         let start = contact.map_or(hold, |contact| contact.start);
-        (start, Untouched::of(recording, block))
+        Some((start, Untouched::of(recording, block)))
     };
     (0..recording.blocks().len()).map(begin).collect()
 }

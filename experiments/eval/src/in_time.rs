@@ -21,7 +21,7 @@ use crate::session::ScoredSession;
 use crate::table::{Cell, Table, TextTable, fixed};
 use crate::tally::{ScoreColumn, bootstrap, unique};
 use crate::training::{SHAPES, TrainingData};
-use crate::truth::{TruthKind, fitted};
+use crate::truth::{MOST_TAXELS, TruthKind, fitted};
 use crate::windows::{Press, Untouched};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
@@ -107,6 +107,12 @@ impl TrainedBoard<'_> {
     pub fn in_time(&self, done: &(dyn Fn() + Sync)) -> Result<InTimeBoard, Refusal> {
         if self.run.sessions.is_empty() && self.source.drops.is_empty() {
             return Err(no_session(self.source));
+        }
+        let taxels = self.source.layout.taxels();
+        if taxels > MOST_TAXELS {
+            let problem =
+                format!("`taxels` = {taxels}: in time, the truth is fitted on skins of at most {MOST_TAXELS}");
+            return Err(Refusal::new(problem));
         }
         for entry in &self.entries {
             if entry.decoders.iter().any(|decoder| decoder.trained.prior().is_none()) {
@@ -379,7 +385,7 @@ fn drop(recording: &Recording, bounce: &RecordedBounce, cols: usize) -> Option<F
 pub type Interval = Option<[f64; 2]>;
 
 /// Scores at one moment: of the last window alone, of a longer window with as many samples as taxels, and with
-/// tracking. Intervals are 95 % confidence intervals, by resampling presses or drops. `None` where nothing was scored.
+/// tracking. Intervals are 95 % confidence intervals, over objects and their presses, or over drops. `None` where nothing was scored.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct InTimeScores {
     /// Mean intersection over union of the last window alone.

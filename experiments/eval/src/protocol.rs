@@ -148,10 +148,10 @@ fn frame_at(recording: &Recording, time_s: f64) -> usize {
     frame.round().clamp(0.0, recording.frames() as f64) as usize
 }
 
-/// Ground truth of an object: a raster image and its support.
+/// A true image and its support.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Truth {
-    /// Raster image, V.
+    /// Image: V of a raster frame or a fitted image, S of what the taxels of a simulation conduct.
     pub image: Vec<f64>,
     /// Taxels above the threshold.
     pub support: Vec<bool>,

@@ -24,8 +24,9 @@ use std::time::Instant;
 pub(crate) struct ScoredPress<'a> {
     measured: Measured,
     truth: Arc<PressTruth>,
-    /// Truth of every window for images, without the samples of the longest one.
-    truths: Vec<Truth>,
+    /// Truth of every window for images, without the samples of the longest one; `None` if the others do not determine
+    /// one.
+    truths: Vec<Option<Truth>>,
     protocol: &'a Protocol,
     measurements_per_frame: usize,
 }
@@ -56,20 +57,23 @@ fn few(recording: &Recording, block: usize, range: Range<usize>, most: usize) ->
 }
 
 impl<'a> ScoredPress<'a> {
-    /// Block `block` of the compressive recording of `session`, for windows of up to `most` measurements; `None`
+    /// Block `block` of the compressive recording of `session`, for windows of these numbers of `measurements`; `None`
     /// without that recording or a true image.
-    pub(crate) fn new(session: &'a ScoredSession, block: usize, most: usize) -> Option<Self> {
-        Self::against(session, block, most, session.truth(block)?)
+    pub(crate) fn new(session: &'a ScoredSession, block: usize, measurements: &[usize]) -> Option<Self> {
+        Self::against(session, block, measurements, session.truth(block)?)
     }
 
     /// The same against the raster frame of another press, as published; `None` without one.
-    pub(crate) fn by_raster(session: &'a ScoredSession, block: usize, most: usize) -> Option<Self> {
-        Self::against(session, block, most, PressTruth::by_raster(session)?)
+    pub(crate) fn by_raster(session: &'a ScoredSession, block: usize, measurements: &[usize]) -> Option<Self> {
+        Self::against(session, block, measurements, PressTruth::by_raster(session)?)
     }
 
-    fn against(session: &'a ScoredSession, block: usize, most: usize, truth: PressTruth) -> Option<Self> {
+    fn against(session: &'a ScoredSession, block: usize, measurements: &[usize], truth: PressTruth) -> Option<Self> {
         let recording = session.compressive.as_ref()?;
         let range = session.protocol.measurements(recording);
+        let most = measurements.iter().copied().max().unwrap_or(1);
+        // the longest windows that there are
+        let longest = measurements.iter().copied().filter(|m| *m <= range.len()).max().unwrap_or(0);
         let mut press = Self {
             truth: Arc::new(truth),
             truths: Vec::new(),
@@ -80,12 +84,12 @@ impl<'a> ScoredPress<'a> {
             protocol: &session.protocol,
             measurements_per_frame: recording.measurements_per_frame(),
         };
-        press.truths = press.truths_of(most);
+        press.truths = press.truths_of(longest);
         Some(press)
     }
 
     /// The truth of every window for images of up to `most` measurements.
-    fn truths_of(&self, most: usize) -> Vec<Truth> {
+    fn truths_of(&self, most: usize) -> Vec<Option<Truth>> {
         let samples = |press: &Press, range: Range<usize>| {
             let end = range.end.min(press.len());
             self.truth.without((range.start..end).filter_map(|k| press.window(k, 1)))
@@ -150,11 +154,12 @@ impl<'a> ScoredPress<'a> {
         let each: Vec<_> = match &self.measured {
             Measured::Recorded(press) => {
                 let windows = press.windows(0..press.len(), m, self.stride());
-                windows.map(|(start, window)| (window, &self.truths[start / self.stride()])).collect()
+                let truth = |start: usize| self.truths.get(start / self.stride())?.as_ref();
+                windows.filter_map(|(start, window)| Some((window, truth(start)?))).collect()
             }
             Measured::Chosen([presses, _]) | Measured::Few(presses) => {
                 let each = presses.iter().zip(&self.truths);
-                each.filter_map(|(press, truth)| Some((press.window(0, m)?, truth))).collect()
+                each.filter_map(|(press, truth)| Some((press.window(0, m)?, truth.as_ref()?))).collect()
             }
         };
         each.into_iter().unzip()

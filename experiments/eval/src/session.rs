@@ -27,7 +27,7 @@ pub struct ScoredSession {
     pub protocol: Protocol,
     /// Scored blocks and frames of the raster recording. These blocks are not used for training.
     pub raster_protocol: Protocol,
-    /// Whether the contact is known to be steady while it is scored, so that a raster scan is its ground truth.
+    /// Whether the contact is known to be steady while it is scored, so that one image is the truth of all windows.
     pub held: bool,
     /// True image of every block of the compressive recording, if a simulation knows it.
     pub simulated: Vec<Option<Vec<f64>>>,
@@ -76,9 +76,13 @@ impl ScoredSession {
     /// Whether there is a compressive recording and a true image for it.
     pub fn scorable(&self) -> bool {
         let known = |block: usize| self.simulated.get(block).is_some_and(Option::is_some);
+        self.scored().any(|block| self.held && self.raster.is_some() || known(block))
+    }
+
+    /// Whether there is a compressive recording alone, of a hold that an image may be fitted to.
+    pub fn without_scan(&self) -> bool {
         let fitted = |r: &Recording| may_be_fitted(r, self.protocol.measurements(r).len());
-        let held = self.held && (self.raster.is_some() || self.compressive.as_ref().is_some_and(fitted));
-        self.scored().any(|block| held || known(block))
+        self.held && !self.scorable() && self.compressive.as_ref().is_some_and(fitted)
     }
 
     /// Scored blocks of the compressive recording.

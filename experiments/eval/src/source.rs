@@ -115,6 +115,16 @@ impl Source {
             scored.push(ScoredSession { again, shared_raster, ..session });
         }
         let sessions = scored;
+        let mut note = note;
+        if sessions.iter().any(ScoredSession::scorable) {
+            let others = sessions.iter().filter(|s| s.without_scan()).map(|s| s.name.as_str());
+            let others: Vec<&str> = others.collect();
+            if !others.is_empty() {
+                let said =
+                    format!("sessions without a raster scan are not scored beside others: {}", others.join(", "));
+                note = Some(note.map_or_else(|| said.clone(), |note| format!("{note}\n{said}")));
+            }
+        }
         Ok(Self { sessions, root, drops, touches, published, missing, simulated, layout, labels, alignment, note })
     }
 
@@ -123,6 +133,13 @@ impl Source {
     pub fn against_scans(mut self) -> Self {
         self.sessions.iter_mut().for_each(|session| session.simulated.clear());
         self
+    }
+
+    /// The sessions that can be scored. Sessions of compressive recordings alone are among them where no session has a
+    /// scan: beside others they would be scored by decoders that know nothing of their objects.
+    pub fn scorable(&self) -> impl Iterator<Item = &ScoredSession> {
+        let scans = self.sessions.iter().any(ScoredSession::scorable);
+        self.sessions.iter().filter(move |s| s.scorable() || !scans && s.without_scan())
     }
 
     /// Whether there are raster presses that are not scored, to learn from.

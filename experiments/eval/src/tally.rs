@@ -192,6 +192,11 @@ impl Mean {
     fn mean(self) -> Option<f64> {
         (self.count > 0.0).then(|| self.sum / self.count)
     }
+
+    /// The mean of `count` values; `None` if some of them are missing.
+    fn mean_of(self, count: f64) -> Option<f64> {
+        self.mean().filter(|_| self.count >= count)
+    }
 }
 
 /// Scores of several presses together.
@@ -199,7 +204,9 @@ pub(crate) fn pool<'a>(presses: impl IntoIterator<Item = &'a Tally>) -> Scores {
     let (mut mean, mut has_images) = (MeanScore::default(), false);
     let (mut others, mut truth) = ([Mean::default(); 3], [Mean::default(); 3]);
     let [mut single, mut voted, mut cumulative, mut summed] = [VoteScore::default(); 4];
+    let mut count = 0.0;
     for press in presses {
+        count += 1.0;
         press.supports.iter().for_each(|s| mean.add(*s));
         has_images |= press.has_images;
         others.iter_mut().zip(&press.others).for_each(|(mean, own)| own.iter().for_each(|v| mean.add(*v)));
@@ -218,9 +225,9 @@ pub(crate) fn pool<'a>(presses: impl IntoIterator<Item = &'a Tally>) -> Scores {
         cosine: cosine.mean().filter(|_| has_images),
         jaccard: jaccard.mean().filter(|_| has_images),
         iou_raster: by_raster.mean().filter(|_| has_images),
-        ceiling: ceiling.mean(),
-        truth_error: error.mean(),
-        ceiling_raster: ceiling_raster.mean(),
+        ceiling: ceiling.mean_of(count),
+        truth_error: error.mean_of(count),
+        ceiling_raster: ceiling_raster.mean_of(count),
         balanced_accuracy: support.map(|s| s.balanced_accuracy),
         class_single: single.share(),
         class_vote20: voted.share(),
@@ -275,8 +282,11 @@ pub(crate) fn bootstrap<T, const K: usize>(
     score: impl Fn(&[Vec<&T>]) -> [Option<f64>; K],
 ) -> [Option<[f64; 2]>; K] {
     let mut rng = Streams::new(1).rng("bootstrap", 0);
-    let own = |object: usize| (0..sessions.len()).filter(move |&i| objects.get(i) == Some(&object));
-    let all: Vec<Vec<usize>> = unique(objects.iter().copied()).into_iter().map(|o| own(o).collect()).collect();
+    // sessions without a press have no part in the means
+    let there = |i: &usize| sessions.get(*i).is_some_and(|presses| !presses.is_empty());
+    let own = |object: usize| (0..objects.len()).filter(move |&i| objects[i] == object).filter(there);
+    let all = unique(objects.iter().copied()).into_iter().map(|o| own(o).collect::<Vec<usize>>());
+    let all: Vec<Vec<usize>> = all.filter(|sessions| !sessions.is_empty()).collect();
     let mut values: [Option<Vec<f64>>; K] = std::array::from_fn(|_| Some(Vec::with_capacity(RESAMPLES)));
     for _ in 0..RESAMPLES {
         let mut drawn: Vec<Vec<&T>> = Vec::with_capacity(sessions.len());

@@ -40,9 +40,9 @@ const LEAST_PER_TAXEL: usize = 4;
 /// Share of the square of a taxel's column that other columns must not explain.
 const DETERMINED: f64 = 0.02;
 /// Images are fitted on skins of at most so many taxels: time grows with their square.
-const MOST_TAXELS: usize = 600;
-/// Samples of a simulated press whose image is fitted, for every taxel at most. They say what the readout allows, and
-/// are not the truth.
+pub(crate) const MOST_TAXELS: usize = 600;
+/// Samples of a simulated press that an image is fitted to, for every taxel at most. It says what the readout allows,
+/// and is not the truth.
 const SIMULATED_PER_TAXEL: usize = 60;
 
 /// What is known of the true image of one press, and how well.
@@ -54,9 +54,9 @@ pub struct PressTruth {
     pub truth: Truth,
     /// One frame of a raster scan of another press, if there is one.
     pub raster: Option<Truth>,
-    /// Intersection over union that the truth itself reaches. Of a fitted image: that of the images of the first and of
-    /// the second half of the hold. Of another: that of the image which is fitted to all samples of the hold. `None`
-    /// where none is fitted.
+    /// How good the truth or the readout is, as an intersection over union. Of a fitted image: that of the images of
+    /// the first and of the second half of the hold. Of a simulated one: that of the image which is fitted to the hold,
+    /// of at most 60 samples a taxel. `None` where none is fitted.
     pub ceiling: Option<f64>,
     /// Intersection over union of the raster frame and the image that is fitted to all samples of the hold.
     pub ceiling_raster: Option<f64>,
@@ -100,10 +100,10 @@ impl PressTruth {
     }
 
     /// The truth for an answer that has seen `windows` of the hold: without their samples, where it is fitted to
-    /// samples.
-    pub fn without<'a>(&self, windows: impl IntoIterator<Item = Window<'a>>) -> Truth {
+    /// samples. `None` if the others do not determine it.
+    pub fn without<'a>(&self, windows: impl IntoIterator<Item = Window<'a>>) -> Option<Truth> {
         let Some(fit) = &self.fit else {
-            return self.truth.clone();
+            return Some(self.truth.clone());
         };
         let mut fit = fit.clone();
         let mut rows = Vec::new();
@@ -111,7 +111,8 @@ impl PressTruth {
             let window = window.with_rows(&mut rows);
             fit.remove(window.phi, window.wires, window.y);
         }
-        fit.solve().map_or_else(|_| self.truth.clone(), Truth::of)
+        let enough = fit.count() >= (LEAST_PER_TAXEL * self.truth.image.len()) as f64 && fit.determines(DETERMINED);
+        enough.then(|| fit.solve().ok().map(Truth::of))?
     }
 }
 
@@ -163,5 +164,63 @@ impl Fitted {
         let error = 0.5 * (squares / taxels as f64).sqrt() / peak;
         let agreement = SupportScore::new(&mask(&a), &mask(&b)).iou;
         Some(Self { fit, image: Truth::of(image), agreement, error })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use spts::session::{Event, Recorded, Session};
+    use spts_circuit::{Block, RecordingInfo, Seeding, WeightMode, Weights};
+    use spts_models::SkinLayout;
+
+    const SAMPLES: u64 = 800;
+
+    /// A hold of an image on 16 taxels, without noise, and of another one in its second half.
+    fn session(later: f64) -> ScoredSession {
+        let weights = Weights::new(WeightMode::Binary, Seeding::Mixed, 16);
+        let info = RecordingInfo::new(SkinLayout::new(4, 4, 5e-3, 3e-3).unwrap(), weights.clone(), 64_300.0);
+        let taxel = |k: u32| [0.0, 0.0, 1.0, 0.5][k as usize % 4] * f64::from(u8::from(k > 7));
+        let sample = |row: u64| {
+            let sum: f64 = (0..16_u32).map(|k| weights.level(k, row) * taxel(k)).sum();
+            2.5 + sum + if row >= SAMPLES / 2 { later * weights.level(0, row) } else { 0.0 }
+        };
+        let block = Block { frame_position: 50, idle_frames: None, volts: (0..SAMPLES).map(sample).collect() };
+        let recording = Recording::new(info, vec![block]).unwrap();
+        let whole = Session {
+            hold_s: Some([0.0, SAMPLES as f64 / 64_300.0]),
+            compressive: Some(Recorded::new(recording)),
+            ..Session::new("hold", Event::Press)
+        };
+        ScoredSession::new(whole, 0)
+    }
+
+    /// The image is that of the samples, whatever the output of the untouched wire; the recording alone is enough. What is
+    /// left of too long a window determines nothing, and is no truth.
+    #[test]
+    fn a_hold_without_noise_is_known_exactly() {
+        let session = session(0.0);
+        assert!(session.without_scan() && !session.scorable());
+        let known = session.truth(0).unwrap();
+        assert_eq!((known.kind, known.ceiling, known.ceiling_raster), (TruthKind::Press, Some(1.0), None));
+        assert!(known.error.unwrap() < 1e-9);
+        let press = Press::new(session.compressive.as_ref().unwrap(), 0, &session.protocol);
+        for (m, there) in [(1, true), (100, true), (700, true), (790, false), (800, false)] {
+            let truth = known.without(press.window(0, m));
+            assert_eq!(truth.is_some(), there, "{m}");
+            for (k, v) in truth.iter().flat_map(|truth| truth.image.iter().enumerate()) {
+                let expected = known.truth.image[k];
+                assert!((v - expected).abs() < 1e-9 && (*v > 0.1) == (k > 7 && k % 4 > 1), "{m}: {k}: {v} {expected}");
+            }
+        }
+    }
+
+    /// A load that comes in the middle of the hold is in one half alone: five taxels against four.
+    #[test]
+    fn a_hold_that_changes_has_a_lower_ceiling() {
+        let known = session(0.6).truth(0).unwrap();
+        assert!((known.ceiling.unwrap() - 0.8).abs() < 1e-12, "{:?}", known.ceiling);
+        // the halves differ by .6 on one of 16 taxels
+        assert!((known.error.unwrap() - 0.5 * 0.6 / 4.0).abs() < 0.02, "{:?}", known.error);
     }
 }

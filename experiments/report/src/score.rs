@@ -58,7 +58,8 @@ fn drawn(charts: impl IntoIterator<Item = Chart>) -> Vec<Chart> {
     charts.into_iter().filter_map(without_empty).collect()
 }
 
-/// Writes `reconstruction`, `classification` and, with a ball, `localisation`, each as .svg and .png.
+/// Writes `reconstruction`, `classification` and, with a ball, `localisation` for each session of drops, each as .svg
+/// and .png.
 fn draw_board(board: &ScoreBoard, folder: &Path) -> Result<(), Refusal> {
     let (iou, single): (Score, Score) = (|r| r.scores.iou, |r| r.scores.class_single);
     let same = "The same over acquisition + decode";
@@ -78,11 +79,14 @@ fn draw_board(board: &ScoreBoard, folder: &Path) -> Result<(), Refusal> {
         scores(board, "Votes of 20 windows", right, Over::M, false, votes),
     ];
     save_charts(&drawn(classes), folder, "classification")?;
-    let ball: Vec<&PlaceRow> = board.localisation.iter().filter(|row| row.contact == "ball").collect();
-    if ball.is_empty() {
-        return Ok(());
+    // drops alone are located with their taxels relabelled, too
+    let drops = unique(board.localisation.iter().filter(|row| row.relabelled).map(|row| row.contact.as_str()));
+    for (k, name) in drops.iter().enumerate() {
+        let own: Vec<&PlaceRow> = board.localisation.iter().filter(|row| row.contact == *name).collect();
+        let file = if k == 0 { "localisation".to_owned() } else { format!("localisation_{name}") };
+        save_charts(&localisation(&own), folder, &file)?;
     }
-    save_charts(&localisation(&ball), folder, "localisation")
+    Ok(())
 }
 
 /// A score of a row.

@@ -133,7 +133,7 @@ impl BoardSettings {
         let asked = |s: &&ScoredSession| {
             self.objects.is_empty() || self.objects.contains(&s.object) || self.objects.contains(&s.name)
         };
-        let scorable = || source.sessions.iter().filter(|s| s.scorable());
+        let scorable = || source.scorable();
         let sessions: Vec<&ScoredSession> = scorable().filter(asked).collect();
         let known = |name: &&String| sessions.iter().any(|s| s.object == **name || s.name == **name);
         if let Some(name) = self.objects.iter().find(|name| !known(name)) {
@@ -258,7 +258,7 @@ impl Run<'_> {
         self.each_press(slots, done, |session, block| {
             let scored = self.sessions[session];
             let press = if self.by_raster { ScoredPress::by_raster } else { ScoredPress::new };
-            let Some(press) = press(scored, block, self.most()) else {
+            let Some(press) = press(scored, block, &self.measurements) else {
                 return Ok(Vec::new());
             };
             let classes = |entry: &Entry| entry.knows_classes;
@@ -356,7 +356,7 @@ impl Run<'_> {
         let Some(&(session, block)) = self.presses().first() else {
             return Ok(Vec::new());
         };
-        let scored = ScoredPress::new(self.sessions[session], block, self.most());
+        let scored = ScoredPress::new(self.sessions[session], block, &self.measurements);
         let Some(press) = scored.as_ref().and_then(ScoredPress::first) else {
             return Ok(Vec::new());
         };
@@ -365,10 +365,10 @@ impl Run<'_> {
     }
 }
 
-/// The object with the lowest IoU, and that IoU; `None` for fewer than two objects.
+/// The session with the lowest IoU, by its name in tables, and that IoU; `None` for fewer than two objects.
 fn worst<'a>(sessions: &[&'a ScoredSession], scores: &[Scores]) -> Option<(&'a str, f64)> {
     let each = sessions.iter().zip(scores).filter_map(|(session, scores)| Some((session.title(), scores.iou?)));
-    each.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|_| sessions.len() > 1)
+    each.min_by(|a, b| a.1.total_cmp(&b.1)).filter(|_| sessions.iter().any(|s| s.object != sessions[0].object))
 }
 
 /// What a row of the score table is about.
@@ -401,14 +401,14 @@ pub struct BoardRow {
     /// nothing of other objects.
     #[serde(default)]
     pub look_up: bool,
-    /// The object with the lowest `iou`, and that `iou`; `None` for a single object.
+    /// The session with the lowest `iou`, by its name in tables, and that `iou`; `None` for a single object.
     #[serde(default)]
     pub worst_object: Option<String>,
     /// See `worst_object`.
     #[serde(default)]
     pub worst_iou: Option<f64>,
-    /// 95 % confidence interval of `support` over objects, their sessions and presses; over the presses of a single
-    /// object.
+    /// 95 % confidence interval of `support` over objects, their sessions and presses; over sessions and presses of a
+    /// single object.
     pub support_ci: Option<[f64; 2]>,
     /// The same of `iou`.
     pub iou_ci: Option<[f64; 2]>,
@@ -468,7 +468,7 @@ pub struct ScoreBoard {
 }
 
 impl ScoreBoard {
-    /// Version of the scores: 2 has images against their own press; before, they were against a raster frame.
+    /// Version of the scores: 2 holds images against their own press, 0 against a raster frame of another one.
     pub const VERSION: u32 = 2;
 
     /// The row with this key.

@@ -142,7 +142,7 @@ fn truths(board: &ScoreBoard) -> String {
     let lines = kinds.iter().map(|kind| {
         let names = unique(board.objects.iter().filter(|o| o.truth == Some(*kind)).map(|o| o.object.as_str()));
         let what = match kind {
-            TruthKind::Simulated => "what the taxels conduct; ceiling: that of all samples of the press, fitted",
+            TruthKind::Simulated => "what the taxels conduct; ceiling: the image fitted to the samples of the press",
             TruthKind::Press => {
                 "the least-squares image of the press, without the window's samples; ceiling: one half of the press \
                  against the other"
@@ -158,7 +158,11 @@ fn truths(board: &ScoreBoard) -> String {
         out.push_str(&ceilings.first().map_or_else(String::new, |c| format!("; all samples of a press reach {c:.3}")));
         out.push('\n');
     }
-    out.push_str("(95 %): over objects, their sessions and presses; worst: the object with the lowest IoU\n");
+    if board.rows.iter().any(|r| r.worst_iou.is_some()) {
+        out.push_str("(95 %): over objects, their sessions and presses; worst: the object with the lowest IoU\n");
+    } else if !board.rows.is_empty() {
+        out.push_str("(95 %): over the presses of one object; says nothing of others\n");
+    }
     out
 }
 

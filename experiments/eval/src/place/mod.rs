@@ -283,7 +283,7 @@ fn ball() -> String {
 /// How well one decoder at one M finds the place of a bouncing ball or of touches.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct PlaceRow {
-    /// Kind of contact: "ball", or the name of a session of touches.
+    /// "ball", or the name of a session: of touches, and of drops where there are several.
     #[serde(default = "ball")]
     pub contact: String,
     /// Algorithm.
