@@ -286,8 +286,8 @@ impl LearnedDecoders {
 }
 
 /// First measurement of the hold of every block, and the untouched skin before it. It is the first of the contact where
-/// something fell on the skin, or touched one that is under preload; `None` in a block of drops without a contact, where
-/// others have one.
+/// something fell on the skin, or touched one that is under preload; `None` in a block of drops without a contact,
+/// where others have one.
 fn begins(session: &Session, recording: &Recording, scored: &ScoredSession) -> Vec<Option<(usize, Untouched)>> {
     let hold = scored.protocol.measurements(recording).start;
     let (mut contacts, mut touches) = (Vec::new(), Vec::new());

@@ -385,7 +385,8 @@ fn drop(recording: &Recording, bounce: &RecordedBounce, cols: usize) -> Option<F
 pub type Interval = Option<[f64; 2]>;
 
 /// Scores at one moment: of the last window alone, of a longer window with as many samples as taxels, and with
-/// tracking. Intervals are 95 % confidence intervals, over objects and their presses, or over drops. `None` where nothing was scored.
+/// tracking. Intervals are 95 % confidence intervals, over objects and their presses, or over drops. `None` where
+/// nothing was scored.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 pub struct InTimeScores {
     /// Mean intersection over union of the last window alone.

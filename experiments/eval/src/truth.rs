@@ -195,8 +195,8 @@ mod tests {
         ScoredSession::new(whole, 0)
     }
 
-    /// The image is that of the samples, whatever the output of the untouched wire; the recording alone is enough. What is
-    /// left of too long a window determines nothing, and is no truth.
+    /// The image is that of the samples, whatever the output of the untouched wire; the recording alone is enough. What
+    /// is left of too long a window determines nothing, and is no truth.
     #[test]
     fn a_hold_without_noise_is_known_exactly() {
         let session = session(0.0);
