@@ -26,8 +26,8 @@ class Scores:
     rows : list of dict
         `decoder`, `m`, `left_out`, `learned_from`, `sensing`, means of `support` (share of taxels on the right side of
         the support), `iou`, `f1`, `class_single` and so on, and their 95 % bands over objects, `iou_ci` and so on. On
-        sessions also `ceiling` (how good the truth is, as an IoU), `worst_object` and `worst_iou`, `cosine` and `jaccard`
-        (no threshold), and `iou_raster` (against one frame of a raster scan).
+        sessions also `ceiling` (how good the truth is, as an IoU), `worst_object` and `worst_iou`, `cosine` and
+        `jaccard` (no threshold), and `iou_raster` (against one frame of a raster scan).
     objects : list of dict
         The same of every object.
     """

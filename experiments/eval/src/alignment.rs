@@ -241,7 +241,7 @@ const CANDIDATES: usize = 12;
 /// of measurements. A slip is given from the end of the contact before it on. Contacts of less than 1.5 measurements a
 /// taxel fit any rows and are left as they are, as are raster scans, several wires, and skins of more than 1024 taxels.
 pub fn contact_slips(recording: &Recording) -> (Vec<Slip>, Vec<(usize, Range<usize>)>) {
-    let (mut slips, mut unaligned) = (Vec::new(), Vec::new());
+    let (mut slips, mut unaligned): (Vec<Slip>, _) = (Vec::new(), Vec::new());
     let (taxels, wires) = (recording.taxels(), recording.weights().wire_count());
     if recording.mode() != Mode::Compressive || taxels > MOST_TAXELS || wires > 1 {
         return (slips, unaligned);
@@ -274,20 +274,14 @@ pub fn contact_slips(recording: &Recording) -> (Vec<Slip>, Vec<(usize, Range<usi
             match found {
                 Some((rows, _)) => {
                     lag = rows;
+                    // at the first contact of a block, in place of the one carried over
+                    slips.pop_if(|slip| (slip.block, slip.from) == (block, from));
                     slips.push(Slip { block, from, rows });
                 }
                 None => unaligned.push((block, start..end)),
             }
         }
     }
-    // where a slip is found at the first contact of a block, the one carried over is replaced
-    slips.dedup_by(|next, slip| {
-        let same = (next.block, next.from) == (slip.block, slip.from);
-        if same {
-            slip.rows = next.rows;
-        }
-        same
-    });
     (slips, unaligned)
 }
 

@@ -8,16 +8,14 @@
 use crate::algorithm::{Belief, Class, Confidence, DecodeError, Subject};
 use crate::board::{Entry, TrainedBoard};
 use crate::decoders::{TrainedDecoder, no_confidence, short_label};
-use crate::protocol::mask;
 use crate::scorer::{ScoredPress, Scorer};
 use crate::sensing::Sensing;
 use crate::table::{Cell, Table, TextTable, fixed};
-use crate::tally::{ScoreColumn, bootstrap, unique};
+use crate::tally::{ScoreColumn, bootstrap, support_score, unique};
 use crate::windows::Window;
 use serde::{Deserialize, Serialize};
 use spts::output::{OutputFolder, write_json};
 use spts_input::Refusal;
-use spts_recon::metrics::SupportScore;
 use spts_recon::{StopRule, statistics};
 
 /// Confidences at which decoders stop in `spts score --anytime`.
@@ -303,9 +301,7 @@ fn attained(
         Right::Support(truth) => truth,
     };
     let answers = scorer.answers(std::slice::from_ref(window))?;
-    let mut found = answers.last().map_or_else(Vec::new, |answer| mask(&answer.image));
-    found.resize(truth.len(), false);
-    Ok(SupportScore::new(&found, truth).iou)
+    Ok(support_score(answers.last().map_or(&[], |answer| &answer.image), truth).iou)
 }
 
 /// How one window ended.

@@ -120,19 +120,13 @@ impl Tally {
         let (cosine, jaccard) = alike(image, &truth.image);
         cosines.push(cosine);
         jaccards.push(jaccard);
-        by_raster.extend(raster.map(|raster| {
-            let mut mask = mask(image);
-            mask.resize(raster.support.len(), false);
-            SupportScore::new(&mask, &raster.support).iou
-        }));
+        by_raster.extend(raster.map(|raster| support_score(image, &raster.support).iou));
     }
 
     /// Scores `image` against the true support `truth`. If other windows have an image and this one has none, it counts
     /// as an empty one.
     pub fn image(&mut self, image: &[f64], truth: &[bool]) {
-        let mut mask = mask(image);
-        mask.resize(truth.len(), false);
-        self.supports.push(SupportScore::new(&mask, truth));
+        self.supports.push(support_score(image, truth));
         self.has_images |= !image.is_empty();
     }
 
@@ -153,6 +147,13 @@ impl Tally {
     pub fn scores(&self) -> Scores {
         pool([self])
     }
+}
+
+/// The support of `image` against the true one; an image that is missing is an empty one.
+pub(crate) fn support_score(image: &[f64], truth: &[bool]) -> SupportScore {
+    let mut found = mask(image);
+    found.resize(truth.len(), false);
+    SupportScore::new(&found, truth)
 }
 
 /// Cosine and weighted Jaccard index of an image and the true one, both scaled to length 1; 0 for an image without a
