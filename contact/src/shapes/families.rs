@@ -3,7 +3,7 @@
 use super::plan::{self, Dice, Dome, Plan, ROUND, arc, convex, regular, shrunk, stretched, stroke};
 use super::region::{Side, depth_m, sides};
 use crate::mesh::polygon::{self, Point};
-use std::f64::consts::{FRAC_PI_2, TAU};
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 /// Steps of half a turn of a curve.
 const HALF: usize = 8;
@@ -364,6 +364,278 @@ pub(crate) fn studs(dice: &mut Dice) -> Plan {
         }
     }
     Plan::apart(feet, Vec::new(), radius)
+}
+
+/// Four to 24 small round or square pads of one body, far apart: in a cross, a lattice with or without gaps, a circle,
+/// a row, or sprinkled.
+pub(crate) fn pads(dice: &mut Dice) -> Plan {
+    let places = match dice.whole(0, 6) {
+        0 | 1 => cross(dice),
+        2 | 3 => lattice(dice),
+        4 => circle(dice),
+        5 => (0..dice.whole(4, 8)).map(|i| [i as f64, 0.0]).collect(),
+        _ => sprinkle(dice),
+    };
+    let loose = if dice.chance(0.4) { 0.1 } else { 0.0 };
+    let width = dice.between(0.2, 0.6);
+    let pad = if dice.chance(0.5) { polygon::circle(0.5 * width, 12) } else { polygon::rectangle(width, width) };
+    // of all, and of every pad about its middle
+    let [turn, own_turn] = [0.5, 0.4].map(|share| if dice.chance(share) { dice.angle_rad() } else { 0.0 });
+    let pads = polygon::placed(&places, turn, [0.0; 2]).into_iter().map(|[x, y]| {
+        let at = [x + loose * dice.between(-0.5, 0.5), y + loose * dice.between(-0.5, 0.5)];
+        polygon::placed(&shrunk(&pad, dice.between(1.0 - loose, 1.0)), turn + own_turn, at)
+    });
+    Plan::apart(pads.collect(), Vec::new(), width.min(1.0 - width))
+}
+
+/// Two rows of three to seven places that meet in one of them: a cross with equal arms, or any cross, T or L.
+fn cross(dice: &mut Dice) -> Vec<Point> {
+    let equal = dice.chance(0.6);
+    let mut row = || {
+        let count = if equal { 2 * dice.whole(1, 3) + 1 } else { dice.whole(3, 7) };
+        let middle = if equal { count / 2 } else { dice.whole(0, count - 1) };
+        (0..count).map(move |i| i as f64 - middle as f64)
+    };
+    let (along, across) = (row(), row());
+    along.map(|x| [x, 0.0]).chain(across.filter(|y| y.abs() > 0.5).map(|y| [0.0, y])).collect()
+}
+
+/// Two to six rows and columns of places, some with every second row half a place on, some with places left out. At
+/// most 24 are left.
+fn lattice(dice: &mut Dice) -> Vec<Point> {
+    let (rows, cols) = (dice.whole(2, 6), dice.whole(2, 6));
+    let (shift, height) = if dice.chance(0.3) { (0.5, 0.75_f64.sqrt()) } else { (0.0, 1.0) };
+    let place = |i: usize| [(i % cols) as f64 + shift * (i / cols % 2) as f64, height * (i / cols) as f64];
+    let mut places: Vec<Point> = (0..rows * cols).map(place).collect();
+    let all = places.len();
+    let left = if dice.chance(0.5) { all } else { dice.whole(all.div_ceil(2).max(4), all) };
+    while places.len() > left.min(24) {
+        places.swap_remove(dice.whole(0, places.len() - 1));
+    }
+    places
+}
+
+/// Six to fourteen places around a circle, some with one in the middle.
+fn circle(dice: &mut Dice) -> Vec<Point> {
+    let count = dice.whole(6, 14);
+    let mut places = polygon::circle(0.5 / (PI / count as f64).sin(), count);
+    if dice.chance(0.3) {
+        places.push([0.0; 2]);
+    }
+    places
+}
+
+/// Four to twenty places within a circle, at least 1 apart.
+fn sprinkle(dice: &mut Dice) -> Vec<Point> {
+    let wanted = dice.whole(4, 20);
+    let reach = 0.75 * (wanted as f64).sqrt();
+    let mut places: Vec<Point> = Vec::new();
+    for _ in 0..50 * wanted {
+        let at = [dice.between(-reach, reach), dice.between(-reach, reach)];
+        let free = places.iter().all(|p| (p[0] - at[0]).hypot(p[1] - at[1]) > 1.0);
+        if free && at[0].hypot(at[1]) < reach && places.len() < wanted {
+            places.push(at);
+        }
+    }
+    places
+}
+
+// Feet and hands.
+
+/// Sole of a left or right foot, shoe or paw: heel and ball, a narrow arch between them or none, toes apart or in one.
+pub(crate) fn foot(dice: &mut Dice) -> Plan {
+    /// Width of the gaps between ball and toes; the heel is about 0.6 wide.
+    const GAP: f64 = 0.06;
+    let side = dice.sign();
+    let (heel, ball) = (dice.between(0.26, 0.36), dice.between(0.36, 0.5));
+    let (length, lean) = (dice.between(1.1, 1.5), dice.between(0.0, 0.12));
+    let (paw, arched) = (dice.chance(0.2), dice.chance(0.7));
+    let toes = if paw { 0.0 } else { dice.between(0.0, 1.0) };
+    // a shoe has a longer front and no toes
+    let reach = ball * if toes < 0.7 { dice.between(0.7, 1.0) } else { dice.between(1.0, 1.6) };
+    let front = [length, lean];
+    let mut width = heel;
+    let mut pieces = Vec::new();
+    if !paw && arched {
+        let least = dice.between(0.14, 0.5);
+        let (outline, narrow) = sole([heel, ball, reach], front, least);
+        pieces.push(outline);
+        width = width.min(narrow);
+    } else {
+        pieces.push(polygon::placed(&polygon::ellipse(reach, ball, ROUND), 0.0, front));
+        if !paw {
+            pieces.push(polygon::ellipse(1.1 * heel, heel, ROUND));
+        }
+    }
+    if toes < 0.5 {
+        let share: &[f64] = if paw { &[1.0; 4] } else { &[1.5, 1.0, 1.0, 0.9, 0.8] };
+        let (from, span) = if paw { (1.35, 2.7) } else { (1.2, 2.1) };
+        let fill = dice.between(0.6, 0.85);
+        let whole: f64 = share.iter().sum();
+        let mut angle = from;
+        for part in share {
+            let slot = span * part / whole;
+            let radius = 0.5 * fill * slot * (GAP + reach.min(ball));
+            let (s, c) = (angle - 0.5 * slot).sin_cos();
+            angle -= slot;
+            if dice.chance(0.08) {
+                continue;
+            }
+            let off = GAP + 1.25 * radius;
+            let at = [front[0] + (reach + off) * c, front[1] + (ball + off) * s];
+            pieces.push(polygon::placed(&polygon::ellipse(1.25 * radius, radius, 12), s.atan2(c), at));
+            width = width.min(2.0 * radius);
+        }
+    } else if toes < 0.7 {
+        let band = dice.between(0.14, 0.22);
+        let off = GAP + 0.5 * band;
+        let path = arc(front, [reach + off, ball + off], [-50.0, 65.0], 10);
+        pieces.push(stroke(&path, band));
+        width = width.min(band);
+    }
+    let turned = pieces.iter().map(|piece| stretched(piece.clone(), side));
+    Plan::apart(turned.collect(), Vec::new(), width)
+}
+
+/// Outline from a round heel about the origin to the ball about `front`, and the width of the arch between them, which
+/// is at least `least` and dented on the side of +y. The ball is `ball` in half width and reaches on by `reach`.
+fn sole([heel, ball, reach]: [f64; 3], front: Point, least: f64) -> (Vec<Point>, f64) {
+    /// Steps of a flank.
+    const STEPS: usize = 12;
+    let middle = heel + ball;
+    let dent = (middle - least).max(0.0);
+    let flank = |i: usize, sign: f64| {
+        let t = i as f64 / STEPS as f64;
+        let smooth = t * t * (3.0 - 2.0 * t);
+        let wave = (PI * t).sin().powi(2);
+        // the inner side has most of the dent
+        let share = if sign > 0.0 { 0.8 } else { 0.2 };
+        let half = heel + (ball - heel) * smooth - share * dent * wave;
+        [t * front[0], smooth * front[1] + sign * half]
+    };
+    let mut outline = arc([0.0; 2], [heel; 2], [90.0, 270.0], 12);
+    outline.extend((1..STEPS).map(|i| flank(i, -1.0)));
+    outline.extend(arc(front, [reach, ball], [-90.0, 90.0], 14));
+    outline.extend((1..STEPS).rev().map(|i| flank(i, 1.0)));
+    (outline, middle - dent)
+}
+
+/// A left or right hand: palm and up to five fingers, spread or closed, or fingertips apart with or without the palm.
+pub(crate) fn hand(dice: &mut Dice) -> Plan {
+    /// Distance of neighbouring fingers at the palm, which is 1 wide.
+    const PITCH: f64 = 0.25;
+    let side = dice.sign();
+    let (tips, closed) = (dice.chance(0.35), dice.chance(0.35));
+    let closed = closed && !tips;
+    let palm = !tips || dice.chance(0.5);
+    let width = if closed { dice.between(0.26, 0.29) } else { dice.between(0.15, 0.2) };
+    let spread = if closed { 0.0 } else { dice.between(0.04, 0.25) };
+    let length = dice.between(0.75, 1.15);
+    // root, angle from +y to +x, length and width of four fingers and the thumb
+    let relative = [0.9, 1.0, 0.92, 0.72];
+    let mut fingers = Vec::new();
+    for (i, relative) in relative.into_iter().enumerate() {
+        let nth = 1.5 - i as f64;
+        let angle = if closed { 0.0 } else { spread * nth + dice.between(-0.03, 0.03) };
+        fingers.push(([PITCH * nth, 0.3], angle, length * relative, width));
+    }
+    let thumb = if closed { dice.between(0.5, 0.8) } else { dice.between(0.7, 1.1) };
+    fingers.push(([0.2, -0.25], thumb, 0.85, 1.2 * width.min(0.22)));
+    let missing = if palm { 0.15 } else { 0.05 };
+    let mut pieces = Vec::new();
+    for (root, angle, length, width) in fingers {
+        // three stay where there is no palm
+        if dice.chance(missing) && (palm || pieces.len() > 2) {
+            continue;
+        }
+        let radius = 0.5 * width;
+        let (s, c) = angle.sin_cos();
+        let end = [root[0] + length * s, root[1] + length * c];
+        let upright = angle - FRAC_PI_2;
+        pieces.push(if tips {
+            polygon::placed(&polygon::ellipse(1.35 * radius, radius, 16), -upright, end)
+        } else {
+            let deg = -angle.to_degrees();
+            let mut finger = arc(end, [radius; 2], [deg, deg + 180.0], 8);
+            finger.extend([-1.0, 1.0].map(|across| [root[0] + across * radius * c, root[1] - across * radius * s]));
+            finger
+        });
+    }
+    if palm {
+        let wrist = dice.between(0.36, 0.46);
+        // closed outer fingers go on from the sides
+        let knuckles = if closed { 1.5 * PITCH + 0.5 * width } else { 0.52 };
+        let corners =
+            [[-wrist, -0.55], [wrist, -0.55], [knuckles, 0.1], [knuckles, 0.45], [-knuckles, 0.45], [-knuckles, 0.1]];
+        pieces.push(polygon::rounded(&corners, dice.between(0.08, 0.25), 4));
+    }
+    let pieces: Vec<_> =
+        pieces.into_iter().map(|piece| piece.into_iter().map(|[x, y]| [side * x, y]).collect()).collect();
+    if tips { Plan::apart(pieces, Vec::new(), width) } else { Plan::union(pieces, Vec::new(), width) }
+}
+
+// Thin rods.
+
+/// Thin rods, about 4 to 12 % of the size in width: two or three that cross, a closed outline, a grid, a few side by
+/// side, or a bow.
+pub(crate) fn rods(dice: &mut Dice) -> Plan {
+    let share = dice.between(0.04, 0.12);
+    let width = 2.0 * share;
+    let line = |from: Point, to: Point, width: f64| stroke(&[from, to], width);
+    match dice.whole(0, 5) {
+        0 => {
+            let meet = [dice.between(-0.4, 0.4), 0.0];
+            let mut rods = vec![line([-1.0, 0.0], [1.0, 0.0], width)];
+            let count = dice.whole(1, 2);
+            let turn = if count == 1 && dice.chance(0.5) { FRAC_PI_2 } else { dice.between(0.7, 1.2) };
+            for i in 0..count {
+                let (s, c) = (turn * (1 + i) as f64).sin_cos();
+                let (ahead, back) = (dice.between(0.5, 1.0), dice.between(0.3, 1.0));
+                rods.push(line([meet[0] + ahead * c, ahead * s], [meet[0] - back * c, -back * s], width));
+            }
+            Plan::union(rods, Vec::new(), width)
+        }
+        1 | 2 => {
+            let outline = if dice.chance(0.3) { plan::blob(dice, 0.15).0 } else { convex(dice).0 };
+            let around = |outline: &[Point]| {
+                let path = [outline, &outline[..2]].concat();
+                stroke(&path, width)
+            };
+            let mut rods = vec![around(&outline)];
+            if dice.chance(0.25) {
+                rods.push(around(&shrunk(&outline, 0.5)));
+            } else if dice.chance(0.3) {
+                rods.push(line(outline[0], outline[outline.len() / 2], width));
+            }
+            Plan::union(rods, Vec::new(), width)
+        }
+        3 => {
+            let (rows, cols) = (dice.whole(2, 5), dice.whole(2, 5));
+            let (x, y) = (0.5 * (cols as f64 - 1.0), 0.5 * (rows as f64 - 1.0));
+            // flush, or well beyond the outer rods: a shorter end would be narrower than its edges
+            let end = if dice.chance(0.5) { 0.0 } else { dice.between(0.35, 0.6) };
+            let width = 2.0 * share * (x.max(y) + end) / (1.0 - share);
+            let (far, high) = (x + end + 0.5 * width, y + end + 0.5 * width);
+            let across = (0..rows).map(|i| i as f64 - y).map(|at| line([-far, at], [far, at], width));
+            let along = (0..cols).map(|i| i as f64 - x).map(|at| line([at, -high], [at, high], width));
+            Plan::union(across.chain(along).collect(), Vec::new(), width.min(1.0 - width))
+        }
+        4 => {
+            let count = dice.whole(2, 5);
+            let pitch = dice.between(2.0 * width, 2.0 / (count as f64 - 1.0));
+            let rods = (0..count).map(|i| {
+                let half = if i == 0 { 1.0 } else { dice.between(0.6, 1.0) };
+                let y = pitch * i as f64;
+                line([-half, y], [half, y], width)
+            });
+            Plan::apart(rods.collect(), Vec::new(), width.min(pitch - width))
+        }
+        _ => {
+            let half_deg = dice.between(110.0, 160.0);
+            let path = arc([0.0; 2], [1.0, dice.between(0.75, 1.0)], [-half_deg, half_deg], 24);
+            Plan::simple(stroke(&path, width), width)
+        }
+    }
 }
 
 // Random unions.

@@ -219,6 +219,14 @@ pub const SHAPE_FAMILIES: &[ShapeFamily] = &[
     family("gear", "Star or gear with five to twelve tips, with or without a bore", families::gear),
     family("studs", "Two to nine feet of one body, apart", families::studs),
     family("union", "Two to four plates, bars and blobs over one another, some with holes and bites", families::union),
+    family(
+        "pads",
+        "Four to 24 small pads of one body, far apart: cross, lattice, circle, row or sprinkled",
+        families::pads,
+    ),
+    family("foot", "Sole of a foot, shoe or paw: heel, ball, arch or none, toes apart or in one", families::foot),
+    family("hand", "Palm and up to five fingers, spread or closed, or fingertips apart", families::hand),
+    family("rods", "Thin rods: two or three that cross, a closed outline, a grid, a row or a bow", families::rods),
 ];
 
 const fn family(name: &'static str, description: &'static str, plan: fn(&mut Dice) -> Plan) -> ShapeFamily {

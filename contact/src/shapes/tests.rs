@@ -57,6 +57,31 @@ fn undersides_are_flat_inside_their_edges() {
     }
 }
 
+/// Numbers of pieces and holes, and widths, of the families that are told apart by them.
+#[test]
+fn pads_are_many_and_rods_are_thin() {
+    let of = |name: &str| {
+        let ranges = ShapeRanges { size_m: [0.1; 2], ..ShapeRanges::default() };
+        (0..400).map(|seed| build_shape(name, &ranges, seed).unwrap()).collect::<Vec<_>>()
+    };
+    let pads = of("pads");
+    assert!(pads.iter().all(|shape| (4..=24).contains(&shape.parts) && shape.holes == 0));
+    // four square ones in a row, 0.6 of their spacing wide, are two thirds of their box
+    assert!(pads.iter().all(|shape| shape.area_m2 < 0.67 * shape.size_m[0] * shape.size_m[1]));
+    assert!(pads.iter().any(|shape| shape.parts == 24) && pads.iter().any(|shape| shape.parts == 4));
+    let rods = of("rods");
+    assert!(rods.iter().all(|shape| (0.03..0.14).contains(&(shape.least_width_m / 0.1))));
+    assert!(rods.iter().any(|shape| shape.holes == 16) && rods.iter().any(|shape| shape.parts == 5));
+    // heel, ball and five toes; five fingertips and the palm
+    for (name, most) in [("foot", 7), ("hand", 6)] {
+        let shapes = of(name);
+        assert!(shapes.iter().all(|shape| shape.parts <= most && shape.holes == 0), "{name}");
+        for parts in [1, most] {
+            assert!(shapes.iter().any(|shape| shape.parts == parts), "{name}: none of {parts} parts");
+        }
+    }
+}
+
 #[test]
 fn what_is_asked_for_in_vain_is_told() {
     let error = build_shape("banana", &ShapeRanges::default(), 1).unwrap_err().to_string();
