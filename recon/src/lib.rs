@@ -24,6 +24,7 @@ mod cholesky;
 pub mod classify;
 pub mod dictionary;
 mod kernels;
+mod kernels32;
 pub mod localise;
 mod matrix;
 pub mod matrix_free;

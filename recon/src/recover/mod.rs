@@ -30,7 +30,7 @@ pub use pursuit::{NnOmp, Omp};
 pub use reference::ReferenceOmp;
 pub use sequential::{Motion, SequentialEstimate, SequentialGains, TrackedImage};
 pub use tv::Tv;
-pub use unrolled::{Layer, Touched, Unrolled, UnrolledStep, UnrolledWeights};
+pub use unrolled::{Touched, Unrolled, UnrolledBlock, UnrolledWeights};
 
 use crate::problem::Recover;
 use spts_input::Refusal;
@@ -61,6 +61,6 @@ pub const REGULARISED: &[(&str, BuildRegularised)] = &[
     ("nn_lasso", |_| Ok(Box::new(NnLasso::new(Penalty::Relative(WEAK))?))),
     ("lmmse", |k| Ok(Box::new(Lmmse::new(Arc::new(Gaussian::white(k, 1.0)?), Noise::Absolute(WEAK))?))),
     ("nn_lmmse", |k| Ok(Box::new(NnLmmse::new(Arc::new(Gaussian::white(k, 1.0)?), Noise::Absolute(WEAK))?))),
-    ("unrolled", |k| Ok(Box::new(Unrolled::new(UnrolledWeights::plain(k, 0.1 * WEAK)?)))),
+    ("unrolled", |k| Ok(Box::new(Unrolled::new(UnrolledWeights::plain(0.01 * WEAK)?, [1, k])?))),
     ("tv", |k| Ok(Box::new(Tv::new(1, k, Penalty::Relative(WEAK))?))),
 ];

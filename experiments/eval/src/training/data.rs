@@ -235,10 +235,10 @@ impl TrainingData {
     /// The network for this sheet.
     ///
     /// # Errors
-    /// [`Refusal`] if it is for another sheet.
+    /// [`Refusal`] if there is no such sheet.
     pub fn network(&self) -> Result<Arc<Unrolled>, Refusal> {
         let network = self.network.clone().unwrap_or_else(TrainedNetwork::shipped);
-        network.on(self.shape)
+        network.on(self.shape).map(Arc::new)
     }
 
     /// Training data with only the dictionary and library of `learned`. The library's images also serve as templates
