@@ -46,10 +46,12 @@ impl Skin {
         succeeds(folder, &[&scene[..], &layout, &place, &rest].concat());
     }
 
-    /// Mean IoU of `windows` decoded windows of both presses at each M of `measurements`.
+    /// Mean IoU of `windows` decoded windows of both presses at each M of `measurements`, by a decoder that has learned
+    /// nothing, so that what it sees are the rows.
     fn decoded(&self, folder: &Path, session: &str, measurements: &[usize], windows: usize) -> Vec<f64> {
         let (m, w) = (listed(measurements), windows.to_string());
-        let found: Value = json(folder, &["decode", session, "--measurements", &m, "--windows", &w, "--json"]);
+        let found: Value =
+            json(folder, &["decode", session, "--decoder", "tv", "--measurements", &m, "--windows", &w, "--json"]);
         let rows = found["rows"].as_array().unwrap();
         let mean = |m: &usize| {
             let of_m = rows.iter().filter(|row| row["m"] == *m);

@@ -65,7 +65,7 @@ fn frames_become_a_session_and_a_wire_records_it() {
         own.map(|row| row["iou"].as_f64().unwrap()).next().unwrap()
     };
     assert!(iou(1, 60) > 0.75 && iou(2, 60) > 0.75 && iou(1, 60) >= iou(1, 30), "{found}");
-    assert_eq!((&found["decoder"], &found["touches"]), (&"mixture".into(), &2.into()));
+    assert_eq!((&found["decoder"], &found["touches"]), (&"amortised".into(), &2.into()));
 
     // what comes of it is a session like any other
     let decoded = json(dir.path(), &words("decode w --measurements 60 --windows 2 --json --out d"));

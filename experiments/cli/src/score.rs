@@ -172,8 +172,8 @@ pub(super) struct ScoreCommand {
     /// too. DIR: other recordings, such as those that `spts reproduce --save-recordings` writes
     #[arg(long, value_name = "SOURCE,...", value_delimiter = ',', default_value = PUBLISHED)]
     learn_from: Vec<String>,
-    /// Trained network of the decoder `amortised`, a file that `python -m spts.amortised` writes; needed for a skin of
-    /// other rows and columns than the published one [default: the network that ships]
+    /// Trained network of the decoder `amortised`, a file that `python -m spts.amortised` writes [default: the
+    /// network that ships]
     #[arg(long, value_name = "FILE")]
     weights: Option<PathBuf>,
     /// How the measurements of a window are selected; with both, every decoder is scored with each. `random`:

@@ -175,30 +175,29 @@ pub fn find(name: &str) -> Option<&'static DecoderSpec> {
 /// Name that stands for the decoder that [`auto`] chooses.
 pub const AUTO: &str = "auto";
 
-/// Taxels of a grid above which `tv` is ahead of `mixture`, which also takes seconds to learn there.
-const COARSE: usize = 144;
+/// Fewest rows, and fewest columns, of the sheets that the network that ships was trained for.
+const NARROWEST: usize = 6;
 
 /// The decoder for images of anything on a skin of `shape` (rows and columns), when nothing is known of the objects:
 ///
-/// 1. `amortised`, where a network for the skin is given (`own_network`);
+/// 1. `amortised`, where a network is given (`own_network`), and on grids of 6 × 6 to 2,048 taxels;
 /// 2. `patches` on skins of more than 2,048 taxels, where the others take seconds and gigabytes;
-/// 3. `tv` on a grid of more than 144 taxels;
-/// 4. `mixture` on all others: on coarse grids, and where the numbers of taxels do not tell which are neighbours.
+/// 3. `mixture` on all others: where the numbers of taxels do not tell which are neighbours.
 ///
 /// docs/decoders.md has the measurements behind the rule.
 ///
 /// ```
 /// use spts_eval::decoders::auto;
 ///
-/// assert_eq!((auto([10, 10], false).name, auto([32, 32], false).name), ("mixture", "tv"));
-/// assert_eq!((auto([1, 600], false).name, auto([32, 32], true).name), ("mixture", "amortised"));
+/// assert_eq!((auto([10, 10], false).name, auto([32, 32], false).name), ("amortised", "amortised"));
+/// assert_eq!((auto([1, 600], false).name, auto([1, 100], true).name), ("mixture", "amortised"));
 /// assert_eq!(auto([100, 100], false).name, "patches");
 /// ```
 pub fn auto([rows, cols]: [usize; 2], own_network: bool) -> &'static DecoderSpec {
     let name = match rows.saturating_mul(cols) {
         _ if own_network => "amortised",
         taxels if taxels > TrainingData::MOST_TAXELS => "patches",
-        taxels if rows > 1 && cols > 1 && taxels > COARSE => "tv",
+        _ if rows.min(cols) >= NARROWEST => "amortised",
         _ => "mixture",
     };
     find(name).unwrap_or(&DECODERS[0])
