@@ -57,10 +57,11 @@ impl TrainedNetwork {
         };
         let (_, metadata) = SafeTensors::read_metadata(bytes).map_err(|e| failed(e.to_string()))?;
         let told = metadata.metadata().as_ref().and_then(|all| all.get("spts")).map_or("{}", String::as_str);
-        let told: Told = serde_json::from_str(told).map_err(|e| failed(format!("`spts`: {e}")))?;
-        if told.kind != KIND {
-            return Err(failed(format!("`kind` is {:?}, expected {KIND:?}", told.kind)));
+        let told: serde_json::Value = serde_json::from_str(told).map_err(|e| failed(format!("`spts`: {e}")))?;
+        if told["kind"] != KIND {
+            return Err(failed(format!("`kind` is {}, expected {KIND:?}", told["kind"])));
         }
+        let told: Told = serde_json::from_value(told).map_err(|e| failed(format!("`spts`: {e}")))?;
         let tensors = SafeTensors::deserialize(bytes).map_err(|e| failed(e.to_string()))?;
         let expected = told.blocks.saturating_mul(NAMES.len());
         if tensors.len() != expected {
@@ -95,7 +96,6 @@ impl TrainedNetwork {
 /// What a file says of its network, beside the numbers.
 #[derive(Debug, Deserialize)]
 struct Told {
-    kind: String,
     blocks: usize,
     widths: [f64; 2],
     priors: Vec<[f64; 4]>,
