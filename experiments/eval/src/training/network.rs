@@ -70,9 +70,24 @@ impl TrainedNetwork {
         }
         let block = |t: usize| -> Result<UnrolledBlock, String> {
             let mut block = UnrolledBlock::default();
+            let length = |name: &str| {
+                let bias = tensors.tensor(&format!("blocks.{t}.{name}"));
+                bias.map_or(0, |bias| bias.shape().iter().product::<usize>())
+            };
+            let (channels, outputs) = (length("b1"), length("b3"));
             for (name, field) in NAMES {
+                let last = match name {
+                    "w1" | "g1" | "dw" => Some(channels),
+                    "w3" => Some(outputs),
+                    _ => None,
+                };
                 let name = format!("blocks.{t}.{name}");
                 let tensor = tensors.tensor(&name).map_err(|e| format!("`{name}`: {e}"))?;
+                // a transposed tensor has as many numbers
+                if last.is_some_and(|last| tensor.shape().last() != Some(&last)) {
+                    let expected = last.unwrap_or_default();
+                    return Err(format!("`{name}` has the shape {:?}, expected {expected} columns", tensor.shape()));
+                }
                 *field(&mut block) = numbers(&tensor).ok_or_else(|| {
                     format!("`{name}` has numbers of the type {:?}, expected F16 or F32", tensor.dtype())
                 })?;
@@ -136,6 +151,20 @@ mod tests {
             assert_eq!(TrainedNetwork::shipped().on(shape).unwrap().taxels(), shape[0] * shape[1]);
         }
         assert!(TrainedNetwork::shipped().on([0, 7]).is_err());
+    }
+
+    /// A transposed tensor has as many numbers.
+    #[test]
+    fn shapes_of_weights_are_checked() {
+        let header = 8 + usize::try_from(u64::from_le_bytes(SHIPPED[..8].try_into().unwrap())).unwrap();
+        let text = std::str::from_utf8(&SHIPPED[8..header]).unwrap();
+        for (from, to) in [("[25,24]", "[24,25]"), ("[24,16]", "[16,24]"), ("[9,24]", "[24,9]")] {
+            let changed = text.replacen(from, to, 1);
+            assert!(changed != text, "{from} is not in {text}");
+            let bytes = [&SHIPPED[..8], changed.as_bytes(), &SHIPPED[header..]].concat();
+            let refused = TrainedNetwork::parse(&bytes, Path::new("w")).unwrap_err().to_string();
+            assert!(refused.contains("columns"), "{refused}");
+        }
     }
 
     #[test]
