@@ -12,7 +12,7 @@ use spts_circuit::Mode;
 use spts_eval::place::find_touches;
 
 /// Velostat without memory and without spread: its static law alone.
-const STATIC: &str = "[transducer_parameters]\nspread_log_sd = 0.0\nsession_log_sd = 0.0\n\
+const STATIC: &str = "[transducer_parameters]\nspread_log_sd = 0.0\nsession_log_sd = 0.0\nsession_tilt_log_sd = 0.0\n\
     hysteresis = { operators = 0 }\ncreep = { per_decade = 0.0 }\nconditioning = { first = 1.0, per_ln_press = 0.0 }\n";
 
 /// Two numbers that are equal up to rounding, which a chain of ten operations keeps far below 1e-9.

@@ -256,7 +256,7 @@ mod tests {
     /// What can be switched on in `velostat`, all at once with either creep.
     const VARIANTS: [&str; 3] = [
         "creep.kind = 'prony'\ncreep.fast_s = 3e-3\ncreep.fast_fall_s = 15e-3\ncreep.instant = 0.0",
-        "session_log_sd = 0.15\ntemperature_c = -10.0\nunloaded_s = 1e-6\ncreep.fast_fall_s = 0.0",
+        "session_log_sd = 0.15\nsession_tilt_log_sd = 0.3\ntemperature_c = -10.0\nunloaded_s = 1e-6\ncreep.fast_fall_s = 0.0",
         "hysteresis.operators = 0\nexponent = 2.0\ncreep.per_decade = 0.0\ncreep.fast_s = 0.0",
     ];
 

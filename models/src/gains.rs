@@ -11,10 +11,10 @@ use spts_input::Refusal;
 /// plus the change from session to session. `spts calibrate --skin` writes them as TOML.
 ///
 /// ```
-/// use spts_models::{SkinLayout, Streams, TaxelGains, Velostat, VelostatConfig};
+/// use spts_models::{Mounting, SkinLayout, Streams, TaxelGains, Velostat, VelostatConfig};
 ///
 /// let skin = SkinLayout::new(1, 2, 0.015, 0.010)?;
-/// let gains = TaxelGains { shape: None, log_mean: vec![0.3, -0.3], log_sd: vec![0.0, 0.0], mounting_log_sd: 0.0 };
+/// let gains = TaxelGains { shape: None, log_mean: vec![0.3, -0.3], log_sd: vec![0.0, 0.0], mounting: Mounting::default() };
 /// let config = VelostatConfig { gains: Some(gains), ..VelostatConfig::default() };
 /// let sheet = Velostat::new(config, &skin, Streams::new(1))?;
 /// let of_taxels: Vec<f64> = sheet.gains().collect();
@@ -32,9 +32,45 @@ pub struct TaxelGains {
     /// Standard deviation of the natural logarithm of a taxel's gain, one value a taxel: how uncertain the gain is.
     /// Range [0, 2].
     pub log_sd: Vec<f64>,
-    /// Standard deviation by which the logarithm of a taxel's gain changes between sessions, in each of which the skin
-    /// is mounted anew. Range [0, 2].
-    pub mounting_log_sd: f64,
+    /// What changes between sessions, in each of which the skin is mounted anew.
+    #[serde(flatten)]
+    pub mounting: Mounting,
+}
+
+/// What a new mounting of the skin changes: the logarithm of a taxel's gain by e + a·u + b·v. Every session draws an e
+/// for each taxel and the slopes a and b of a plane. u and v, from -1 to 1, are the taxel's place along the rows and
+/// along the columns ([`SkinLayout::share_of_half`]). All are normal with mean 0.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Mounting {
+    /// Standard deviation of e. Range [0, 2].
+    #[serde(rename = "mounting_log_sd")]
+    pub log_sd: f64,
+    /// Standard deviation of a and b, a half sheet: the foam and the sheet lie askew. Range [0, 2].
+    #[serde(rename = "mounting_tilt_log_sd", default)]
+    pub tilt_log_sd: f64,
+}
+
+impl Mounting {
+    /// Standard deviation of the logarithm of a taxel's change: √(σ² + τ²·(u² + v²)).
+    pub fn taxel_log_sd(&self, [u, v]: [f64; 2]) -> f64 {
+        self.log_sd.hypot(self.tilt_log_sd * u.hypot(v))
+    }
+
+    /// Root mean square of [`Self::taxel_log_sd`] over a large sheet: √(σ² + ⅔ τ²).
+    pub fn mean_log_sd(&self) -> f64 {
+        self.taxel_log_sd([(2.0_f64 / 3.0).sqrt(), 0.0])
+    }
+
+    /// The factor of every taxel of `skin` in one session, exactly 1 without a spread, from standard normal numbers: one
+    /// for each of the two slopes, and one for each taxel.
+    pub fn factors(self, skin: &SkinLayout, slopes: [f64; 2], mut each: impl FnMut() -> f64) -> Vec<f64> {
+        let [a, b] = slopes.map(|z| self.tilt_log_sd * z);
+        let factor = |taxel| {
+            let [u, v] = skin.share_of_half(taxel);
+            (self.log_sd * each() + (a * u + b * v)).exp()
+        };
+        (0..skin.taxels()).map(factor).collect()
+    }
 }
 
 impl TaxelGains {
@@ -65,7 +101,8 @@ impl TaxelGains {
                 in_interval(&format!("gains.{field}[{taxel}]"), value, range)?;
             }
         }
-        in_interval("gains.mounting_log_sd", self.mounting_log_sd, "[0, 2]")
+        in_interval("gains.mounting_log_sd", self.mounting.log_sd, "[0, 2]")?;
+        in_interval("gains.mounting_tilt_log_sd", self.mounting.tilt_log_sd, "[0, 2]")
     }
 
     /// Checks all values, and that they belong to `skin`.
@@ -99,10 +136,11 @@ impl TaxelGains {
     }
 
     /// Standard deviation of the natural logarithm of every taxel's gain in a session that was not part of the
-    /// calibration, one value a taxel in row-major order: √(`log_sd`² + `mounting_log_sd`²), the uncertainty of the
-    /// fixed gain and the change from session to session together.
-    pub fn session_log_sd(&self) -> impl Iterator<Item = f64> + '_ {
-        self.log_sd.iter().map(|sd| sd.hypot(self.mounting_log_sd))
+    /// calibration, one value a taxel of `skin` in row-major order: the uncertainty of the fixed gain and the change by
+    /// the mounting together.
+    pub fn session_log_sd<'a>(&'a self, skin: &'a SkinLayout) -> impl Iterator<Item = f64> + 'a {
+        let known = self.log_sd.iter().enumerate();
+        known.map(|(taxel, sd)| sd.hypot(self.mounting.taxel_log_sd(skin.share_of_half(taxel))))
     }
 }
 
@@ -141,7 +179,12 @@ mod tests {
     use approx::assert_relative_eq;
 
     fn two() -> TaxelGains {
-        TaxelGains { shape: Some([1, 2]), log_mean: vec![0.5, -0.5], log_sd: vec![0.1, 0.3], mounting_log_sd: 0.1 }
+        TaxelGains {
+            shape: Some([1, 2]),
+            log_mean: vec![0.5, -0.5],
+            log_sd: vec![0.1, 0.3],
+            mounting: Mounting { log_sd: 0.1, tilt_log_sd: 0.2 },
+        }
     }
 
     /// Standard errors of n = 4000 values: σ/√n of the mean, σ/√(2n) of the standard deviation; five of each.
@@ -175,6 +218,7 @@ mod tests {
             ("log_mean = []\nlog_sd = []\nmounting_log_sd = 0.1", "gains.log_mean.length` = 0"),
             ("log_mean = [0.0]\nlog_sd = [0.0]", "mounting_log_sd"),
             ("log_mean = [0.0]\nlog_sd = [0.0]\nmounting_log_sd = 0.1\nmean = 2", "mean"),
+            ("log_mean = [0.0]\nlog_sd = [0.0]\nmounting_log_sd = 0.1\nmounting_tilt_log_sd = 3.0", "[0, 2]"),
         ] {
             let said = TaxelGains::from_toml(text).unwrap_err();
             assert!(said.contains(part), "{said}");
@@ -190,6 +234,18 @@ mod tests {
         let sd = (logs.iter().map(|l| (l - mean).powi(2)).sum::<f64>() / 1e4).sqrt();
         assert_relative_eq!(mean, 0.0, epsilon = 5.0 * 0.30 / 1e2);
         assert_relative_eq!(sd, 0.30, epsilon = 5.0 * 0.30 / (2e4_f64).sqrt());
+    }
+
+    /// Two taxels at u = ±1/2, v = 0 with the slope a: e^{±a/2}; their deviation is √(σ² + τ²/4).
+    #[test]
+    fn a_mounting_tilts_the_sheet() {
+        let skin = SkinLayout::new(2, 1, 15e-3, 10e-3).unwrap();
+        let mounting = Mounting { log_sd: 0.3, tilt_log_sd: 0.2 };
+        let found = mounting.factors(&skin, [2.0, 1.0], || 0.0);
+        assert_relative_eq!(found[0], (-0.2_f64).exp(), max_relative = 1e-15);
+        assert_relative_eq!(found[1], 0.2_f64.exp(), max_relative = 1e-15);
+        let sd = mounting.taxel_log_sd(skin.share_of_half(0));
+        assert_relative_eq!(sd, (0.09_f64 + 0.01).sqrt(), max_relative = 1e-15);
     }
 
     #[test]

@@ -138,6 +138,13 @@ impl SkinLayout {
         [self.cols as f64 * self.pitch_m, self.rows as f64 * self.pitch_m]
     }
 
+    /// Where the middle of the taxel number `taxel` (row-major) lies along the rows and along the columns of the sheet:
+    /// -1 and 1 are its edges, 0 its middle.
+    pub fn share_of_half(&self, taxel: usize) -> [f64; 2] {
+        let along = |index: usize, count: usize| (2 * index + 1) as f64 / count as f64 - 1.0;
+        [along(taxel / self.cols, self.rows), along(taxel % self.cols, self.cols)]
+    }
+
     /// Position (x, y), m, of the taxel coordinate `(row, col)`, which may be fractional.
     pub fn position_m(&self, row: f64, col: f64) -> [f64; 2] {
         let [width, height] = self.extent_m();

@@ -33,7 +33,7 @@ mod transducers;
 
 pub use check::{explain_toml, fits_memory, in_interval, in_range, in_section, parsed, parsed_text, within};
 pub use conformance::check_transducer;
-pub use gains::TaxelGains;
+pub use gains::{Mounting, TaxelGains};
 pub use layout::{ConductanceMap, Grid, Pascal, PressureMap, Siemens, SkinLayout};
 pub use memory::{Conditioning, Creep, CreepConfig, CreepDecays, CreepKind, Hysteresis, HysteresisConfig, Presses};
 pub use snapshot::Snapshot;

@@ -68,7 +68,7 @@ mod tests {
         assert!(build("velostat", "creep.shares = [0.1]").contains("creep.tau_s (length)"));
         let outside = "exponent = nan; reference_s = -1.0; saturation_pa = inf; creep.fast_s = nan; \
             creep.fast_fall_s = 2.0; creep.instant = -0.1; creep.start_s = 1e9; creep.shares = [0.1, nan, 0.1]; \
-            creep.shares = [0.1, -0.01, 0.1]; creep.tau_s = [1.0, 0.0, 2.0]; session_log_sd = nan; temperature_c = 70.0; \
+            creep.shares = [0.1, -0.01, 0.1]; creep.tau_s = [1.0, 0.0, 2.0]; session_log_sd = nan; session_tilt_log_sd = -1.0; temperature_c = 70.0; \
             resistance_per_k = 0.1; conditioning.first = 0.0; hysteresis.width = 0.5";
         for text in outside.split("; ") {
             let field = text.split(' ').next().unwrap();

@@ -219,7 +219,7 @@ impl<'a> Training<'a> {
         if let Some(skin) = self.skin {
             let gains = skin_gains(skin, layout)?;
             let simulated = simulated_presses(*layout, true, self.seed)?;
-            let data = TrainingData::of_skin(&simulated, &gains, layout.cols(), self.streams)?;
+            let data = TrainingData::of_skin(&simulated, &gains, layout, self.streams)?;
             return Ok((data, Some(&self.labels)));
         }
         match self.source.as_ref().filter(|source| source.layout == *layout) {

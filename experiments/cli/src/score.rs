@@ -94,7 +94,8 @@ Files in DIR:
   figures/                   reconstruction, classification and localisation over M and over time, .svg and .png
 With --anytime:
   anytime.json               everything; anytime.csv, objects.csv
-  figures/                   anytime: error of classes and images over the number of samples used, .svg and .png
+  figures/                   anytime: error of classes and images over the number of samples used; reliability: what
+                             was attained over what was stated; .svg and .png
 With --in-time:
   in_time.json               everything; in_time.csv, objects.csv
   figures/                   in_time: IoU of presses and place of the ball over the time since the touch, .svg and .png

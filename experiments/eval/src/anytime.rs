@@ -69,6 +69,36 @@ pub struct AnytimeRow {
     pub windows: usize,
     /// Number of windows that the algorithm could not process to the end. They count as never confident and wrong.
     pub failed: usize,
+    /// Largest [`StopScores::calibration_error`] of an object.
+    pub worst_calibration_error: Option<f64>,
+    /// What was stated and what was attained, over the windows of all objects.
+    pub reliability: Vec<Stated>,
+}
+
+/// Windows whose stated confidence lies in one tenth of [0, 1], at the end of the window.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+pub struct Stated {
+    /// Mean of the stated confidences.
+    pub stated: f64,
+    /// Mean of what was attained: share of right classes, or mean intersection over union.
+    pub attained: f64,
+    /// Number of windows.
+    pub windows: usize,
+}
+
+impl Stated {
+    /// `parts` joined by the tenth of [0, 1] that was stated, in rising order; tenths without windows are left out.
+    pub fn tenths(parts: impl IntoIterator<Item = Self>) -> Vec<Self> {
+        let mut tenths = [Self::default(); 10];
+        for part in parts {
+            let tenth = &mut tenths[(1..10).filter(|tenth| part.stated >= f64::from(*tenth) / 10.0).count()];
+            tenth.windows += part.windows;
+            let share = part.windows as f64 / (tenth.windows as f64).max(1.0);
+            tenth.stated += share * (part.stated - tenth.stated);
+            tenth.attained += share * (part.attained - tenth.attained);
+        }
+        tenths.into_iter().filter(|tenth| tenth.windows > 0).collect()
+    }
 }
 
 /// Results of `spts score --anytime` for one object, decoder and confidence.
@@ -126,6 +156,7 @@ impl TrainedBoard<'_> {
                 },
             };
             let scores: Vec<StopScores> = presses.iter().map(pool).collect();
+            let errors = scores.iter().filter_map(|s| s.calibration_error);
             let windows = |presses: &[PressStops]| presses.iter().map(|press| press.windows.len()).sum::<usize>();
             let [samples_ci, attained_ci] = intervals(&presses, &self.run.objects());
             board.rows.push(AnytimeRow {
@@ -136,6 +167,8 @@ impl TrainedBoard<'_> {
                 attained_ci,
                 windows: presses.iter().map(|presses| windows(presses)).sum(),
                 failed: presses.iter().flatten().map(|press| press.failed).sum(),
+                worst_calibration_error: errors.reduce(f64::max),
+                reliability: reliability(presses.iter().flatten().flat_map(|press| &press.windows)),
             });
             let each = self.run.sessions.iter().zip(&presses).zip(scores);
             board.objects.extend(each.map(|((session, presses), scores)| AnytimeObject {
@@ -343,6 +376,16 @@ pub struct StopScores {
     pub stated: Option<f64>,
     /// Share of windows that never reached the wanted confidence.
     pub never: Option<f64>,
+    /// Expected calibration error of the confidences at the end of the windows: mean over all windows of |attained −
+    /// stated|, both as means over the window's tenth ([`Stated`]). Source: C. Guo, G. Pleiss, Y. Sun, K. Weinberger,
+    /// *On calibration of modern neural networks*, ICML 2017.
+    pub calibration_error: Option<f64>,
+}
+
+/// What was stated and what was attained in each tenth of [0, 1] that has windows.
+fn reliability<'a>(windows: impl IntoIterator<Item = &'a WindowStop>) -> Vec<Stated> {
+    let each = windows.into_iter();
+    Stated::tenths(each.map(|w| Stated { stated: w.stated, attained: w.attained, windows: 1 }))
 }
 
 /// Scores of several presses together.
@@ -358,7 +401,10 @@ fn pool<'a>(presses: impl IntoIterator<Item = &'a PressStops>) -> StopScores {
         let rank = (samples.len() * share).div_ceil(of).max(1);
         samples.get(rank - 1).map(|samples| *samples as f64)
     };
+    let tenths = reliability(windows.iter().copied());
+    let apart = tenths.iter().map(|t| t.windows as f64 * (t.attained - t.stated).abs());
     StopScores {
+        calibration_error: (!windows.is_empty()).then(|| apart.sum::<f64>() / windows.len() as f64),
         samples: all(|w| w.samples as f64),
         samples_median: quantile(1, 2),
         samples_p90: quantile(9, 10),
@@ -383,6 +429,7 @@ fn mean(scores: &[StopScores], all: &StopScores) -> StopScores {
         attained_reached: those(|s| s.attained_reached),
         stated: those(|s| s.stated),
         never: every(|s| s.never),
+        calibration_error: every(|s| s.calibration_error),
         ..*all
     }
 }
@@ -412,7 +459,7 @@ fn intervals(sessions: &[Vec<PressStops>], objects: &[usize]) -> [Option<[f64; 2
     })
 }
 
-const SCORES: [ScoreColumn<StopScores>; 7] = [
+const SCORES: [ScoreColumn<StopScores>; 8] = [
     ("samples", |s| s.samples),
     ("samples_median", |s| s.samples_median),
     ("samples_p90", |s| s.samples_p90),
@@ -420,6 +467,7 @@ const SCORES: [ScoreColumn<StopScores>; 7] = [
     ("attained_reached", |s| s.attained_reached),
     ("stated", |s| s.stated),
     ("never", |s| s.never),
+    ("calibration_error", |s| s.calibration_error),
 ];
 
 /// Writes `anytime.json`, `anytime.csv` and `objects.csv` into the folder `out`.
@@ -435,6 +483,7 @@ pub fn write(board: &AnytimeBoard, out: &mut OutputFolder) -> Result<(), Refusal
         .file("most", |r| r.most)
         .file("windows", |r| r.windows)
         .file("failed", |r| r.failed)
+        .file("worst_calibration_error", |r| r.worst_calibration_error)
         .write(out)?;
     keyed(Table::new("objects", &board.objects), |r| &r.key)
         .file("object", |r| &r.object)
@@ -467,7 +516,7 @@ pub fn table(board: &AnytimeBoard) -> String {
             out.push_str(&format!("\n{title}\n{}", text(rows, attained)));
         }
     }
-    out.push_str("\nwanted: confidence at which a window ends, fixed: all windows take as many samples; stated: mean confidence of the windows that reached it; never: share that did not, which count with all of their samples\n");
+    out.push_str("\nwanted: confidence at which a window ends, fixed: all windows take as many samples; stated: mean confidence of the windows that reached it; never: share that did not, which count with all of their samples; error: expected calibration error, mean over the objects, and of the worst object\n");
     if board.rows.iter().any(|r| r.key.sensing == Sensing::Chosen) {
         out.push_str("chosen rows: picked from those of a press for what was learned, before a sample is seen; their order in time is lost\n");
     }
@@ -477,6 +526,7 @@ pub fn table(board: &AnytimeBoard) -> String {
 
 fn text(rows: Vec<&AnytimeRow>, attained: &str) -> String {
     let failed = rows.iter().any(|r| r.failed > 0);
+    let fixed = |r: &AnytimeRow, value: Option<f64>| value.filter(|_| r.key.confidence.is_none());
     let sure = |r: &AnytimeRow, value: Option<f64>| value.filter(|_| r.key.confidence.is_some());
     let mut table = Table::new("", rows)
         .shown("decoder", |r: &AnytimeRow| short_label(&r.key.decoder))
@@ -489,8 +539,10 @@ fn text(rows: Vec<&AnytimeRow>, attained: &str) -> String {
         .number("90 %", 0, |r| r.scores.samples_p90)
         .number(attained, 3, |r| r.scores.attained)
         .shown("(95 %)", |r| Cell::span(r.attained_ci, 3))
-        .number("stated", 3, move |r| sure(r, r.scores.stated))
-        .number("never", 3, move |r| sure(r, r.scores.never));
+        .number("stated", 3, |r| r.scores.stated)
+        .number("never", 3, move |r| sure(r, r.scores.never))
+        .number("error", 3, move |r| fixed(r, r.scores.calibration_error))
+        .number("worst", 3, move |r| fixed(r, r.worst_calibration_error));
     if failed {
         table = table.shown("", |r| match r.failed {
             0 => String::new(),
@@ -619,7 +671,19 @@ mod tests {
         let scores = pool([&press(&windows)]);
         assert!(near(scores.samples, 14.5) && near(scores.samples_median, 5.0) && near(scores.samples_p90, 9.0));
         assert!(near(scores.attained, 0.9) && near(scores.attained_reached, 1.0) && near(scores.never, 0.1));
-        assert!(near(scores.stated, 0.9));
+        assert!(near(scores.stated, 0.9) && near(scores.calibration_error, 0.0));
+        // a tenth that promises too much, and one that promises too little
+        let [low, high] = [(0.25, 0.0), (0.75, 1.0)].map(|(stated, attained)| WindowStop {
+            samples: 1,
+            reached: true,
+            stated,
+            attained,
+        });
+        let both = PressStops { windows: vec![low, high, high, high], failed: 0 };
+        assert!(near(pool([&both]).calibration_error, 0.25));
+        let tenths = reliability(&both.windows);
+        assert_eq!(tenths.iter().map(|t| t.windows).collect::<Vec<_>>(), [1, 3]);
+        assert!(near(Some(tenths[1].stated), 0.75) && near(Some(tenths[1].attained), 1.0));
         assert_eq!(pool([&PressStops::default()]), StopScores::default());
 
         // objects count alike, however many windows they have

@@ -6,7 +6,7 @@ use spts_eval::training::GainCheck;
 use spts_input::Refusal;
 use spts_recon::statistics::mean;
 use spts_studies::calibrate::{
-    Beat, CalibrationReport, Estimated, Mounting, NOT_IDENTIFIABLE, NOT_MODELLED, NUMBERS, PredictedInside,
+    Beat, CalibrationReport, Estimated, GainPlane, NOT_IDENTIFIABLE, NOT_MODELLED, NUMBERS, PredictedInside, Remounted,
     SessionEstimates, SessionGains, SkinReport,
 };
 use std::path::Path;
@@ -55,10 +55,13 @@ fn remarks(s: &SessionEstimates) -> Vec<String> {
         s.steps.map_or_else(|| "values on no grid".to_owned(), |steps| format!("step {:.4} mV", 1e3 * steps.step_v));
     let presses = s.presses.len();
     let mut found = vec![format!("{presses} presses, {grid}, beats [measurements]: {beats}")];
-    if let Some(SessionGains { taxels, log_sd, standard_error }) = &s.gains {
+    if let Some(SessionGains { taxels, log_sd, standard_error, plane }) = &s.gains {
         let taxels = taxels.len();
+        let tilt = plane.map_or_else(String::new, |GainPlane { slopes: [a, b], standard_errors: [da, db], log_sd }| {
+            format!(", {log_sd:.3} about a plane with slopes {a:.2} ± {da:.2} and {b:.2} ± {db:.2} a half sheet")
+        });
         found.push(format!(
-            "gains of {taxels} taxels against the raster session: log-sd {log_sd:.3} ± {standard_error:.3}"
+            "gains of {taxels} taxels against the raster session: log-sd {log_sd:.3} ± {standard_error:.3}{tilt}"
         ));
     }
     found.extend(s.faults.iter().map(ToString::to_string));
@@ -96,17 +99,23 @@ pub fn skin_text(report: &SkinReport) -> String {
     let mountings = if report.mountings.is_empty() {
         "(not measured: no session has both recordings)".to_owned()
     } else {
-        let each = |m: &Mounting| format!("{} {:.3}", m.session, m.log_sd);
-        format!("(median of {})", report.mountings.iter().map(each).collect::<Vec<_>>().join(", "))
+        let slopes = |m: &Remounted| match m.plane {
+            Some(GainPlane { slopes: [a, b], .. }) => format!(" with slopes {a:.2} and {b:.2}"),
+            None => String::new(),
+        };
+        let each = |m: &Remounted| format!("{} {:.3}{}", m.session, m.log_sd, slopes(m));
+        format!("({})", report.mountings.iter().map(each).collect::<Vec<_>>().join(", "))
     };
     let mut out = format!(
         "gains of {rows} × {cols} taxels, {} of them touched; objects: {}\n\
-         standard deviation of log gain: {:.3} over the skin, {:.3} from a simulated contact, {:.3} from a mounting {mountings}\n",
+         standard deviation of log gain: {:.3} over the skin, {:.3} from a simulated contact, {:.3} from a mounting and\n\
+         {:.3} by which it tilts from the middle to the edge {mountings}\n",
         skin.sessions.iter().filter(|n| **n > 0).count(),
         skin.fitted_objects,
         skin.spread_log_sd,
         skin.contact_log_sd,
-        skin.gains.mounting_log_sd,
+        skin.gains.mounting.log_sd,
+        skin.gains.mounting.tilt_log_sd,
     );
     if cols <= MOST_SHOWN {
         let gains: Vec<f64> = skin.gains.log_mean.iter().map(|log| log.exp()).collect();

@@ -4,7 +4,7 @@ use super::write_all_or_none;
 use crate::figures::{Chart, Curve, Plot, Stroke, Style, save_charts};
 use spts::output::OutputFolder;
 use spts_eval::algorithm::Subject;
-use spts_eval::anytime::{self, AnytimeBoard, AnytimeRow};
+use spts_eval::anytime::{self, AnytimeBoard, AnytimeRow, Stated};
 use spts_eval::board::{self, BoardRow, ScoreBoard};
 use spts_eval::decoders::short_label;
 use spts_eval::in_time::{self, ContactKind, InTimeBoard, InTimeRow};
@@ -25,7 +25,7 @@ pub fn write(scores: &ScoreBoard, out: OutputFolder) -> Result<(), Refusal> {
     })
 }
 
-/// Writes `anytime.json`, `anytime.csv`, `objects.csv` and the figure `anytime` into the folder `out`: all of them, or
+/// Writes `anytime.json`, `anytime.csv`, `objects.csv` and the figures `anytime` and `reliability` into the folder `out`: all of them, or
 /// none.
 ///
 /// # Errors
@@ -33,7 +33,9 @@ pub fn write(scores: &ScoreBoard, out: OutputFolder) -> Result<(), Refusal> {
 pub fn write_anytime(scores: &AnytimeBoard, out: OutputFolder) -> Result<(), Refusal> {
     write_all_or_none(out, |out| {
         anytime::write(scores, out)?;
-        save_charts(&stops(scores), &out.folder("figures")?, "anytime")
+        let figures = out.folder("figures")?;
+        save_charts(&reliability(scores), &figures, "reliability")?;
+        save_charts(&stops(scores), &figures, "anytime")
     })
 }
 
@@ -178,6 +180,36 @@ fn stops(board: &AnytimeBoard) -> Vec<Chart> {
     drawn([
         panel("Class", "share of wrong classes", Subject::Class, false),
         panel(image, "1 − IoU", Subject::Image, left_out),
+    ])
+}
+
+/// What decoders with a fixed number of samples state, and what they attain, over all numbers of samples: a panel of
+/// the classes and one of the images.
+fn reliability(board: &AnytimeBoard) -> Vec<Chart> {
+    let panel = |title: &str, y_label: &str, subject: Subject| {
+        let here = board.rows.iter().filter(|r| r.key.subject == subject && r.key.confidence.is_none());
+        let keys = unique(here.clone().map(|r| (&*r.key.decoder, r.key.sensing, r.key.left_out, &*r.key.learned_from)));
+        let mut points = Vec::new();
+        for key in keys {
+            let same = |r: &&&AnytimeRow| key == (&*r.key.decoder, r.key.sensing, r.key.left_out, &*r.key.learned_from);
+            let own = here.clone().filter(|r| same(&r)).flat_map(|r| &r.reliability);
+            points.extend(Stated::tenths(own.copied()).into_iter().map(|tenth| (key, tenth)));
+        }
+        let curve = move |((decoder, sensing, left_out, learned), _): ((&str, Sensing, bool, &str), Stated)| {
+            let whose = if left_out { "left out" } else { learned };
+            let stroke = Stroke::of(usize::from(sensing == Sensing::Chosen));
+            Curve::of_decoder(format!("{}, {} rows, {whose}", short_label(decoder), sensing.name()), decoder, stroke)
+        };
+        Plot::new(points)
+            .x("stated", |(_, tenth)| tenth.stated)
+            .y(y_label, |(_, tenth)| tenth.attained)
+            .within(0.0, 1.02)
+            .by(curve)
+            .chart(title)
+    };
+    drawn([
+        panel("Class: a good confidence is on the diagonal", "share of right classes", Subject::Class),
+        panel("Image: a good confidence is on the diagonal", "mean IoU", Subject::Image),
     ])
 }
 

@@ -296,7 +296,7 @@ const OTHER: &str = "other";
 /// Parts of the transducer, each with the parameters (TOML) that take it away.
 const PARTS: &[(&str, &str)] = &[
     ("spread", "spread_log_sd = 0.0"),
-    ("session", "session_log_sd = 0.0"),
+    ("session", "session_log_sd = 0.0\nsession_tilt_log_sd = 0.0"),
     ("hysteresis", "hysteresis.operators = 0"),
     ("creep", "creep = { per_decade = 0.0, instant = 1.0 }"),
     ("conditioning", "conditioning = { first = 1.0, per_ln_press = 0.0 }"),

@@ -335,8 +335,8 @@ fn with_skin_gains(set: &SessionSet, real: &Source, seed: u64) -> Result<Source,
     let mut source = simulated.clone();
     for (scored, session) in source.sessions.iter_mut().zip(&set.sessions) {
         let [skin, median] = [real, &simulated].map(|source| others(&source.sessions, &scored.object));
-        let mounting = VelostatConfig::default().session_log_sd;
-        let known = SkinGains::estimate(&skin?, &median?, mounting);
+        let mounting = VelostatConfig::default().mounting();
+        let known = SkinGains::estimate(&skin?, &median?, &real.layout, mounting);
         let known = known.map_err(|e| e.at("gains of the skin"))?;
         let gains: Vec<f64> = known.gains.log_mean.iter().map(|log| log.exp()).collect();
         let readout = ReadoutOfImages::new(seed, scored)?;

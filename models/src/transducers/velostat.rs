@@ -1,12 +1,13 @@
 //! The piezoresistive sheet.
 
 use crate::check::in_interval;
-use crate::gains::{Spread, TaxelGains};
+use crate::gains::{Mounting, Spread, TaxelGains};
 use crate::layout::{ConductanceMap, PressureMap, SkinLayout};
 use crate::memory::{Conditioning, Creep, CreepConfig, CreepDecays, Hysteresis, HysteresisConfig, Presses};
 use crate::snapshot::Snapshot;
 use crate::streams::Streams;
 use crate::transducer::{Transducer, elapsed_s, loaded_pa};
+use rand_distr::{Distribution as _, StandardNormal};
 use serde::Deserialize;
 use spts_input::Refusal;
 
@@ -42,7 +43,11 @@ pub struct VelostatConfig {
     /// √2 times this standard deviation; recorded with one object in two sessions: 0.12–0.16 for four objects and 0.31
     /// for a fifth (`spts calibrate`, median 0.14).
     pub session_log_sd: f64,
-    /// Gains of a calibrated skin. They replace `spread_log_sd` and `session_log_sd`; every seed then draws a skin that
+    /// Standard deviation of the slopes, along the rows and along the columns, of a plane that is added in each session
+    /// to the logarithm of the taxels' gains, from the middle of the sheet to its edge. Range [0, 2]; default 0.20: see
+    /// [`Mounting`]. Recorded in two sessions each of four objects: `spts calibrate --skin`.
+    pub session_tilt_log_sd: f64,
+    /// Gains of a calibrated skin. They replace `spread_log_sd` and both of `session_…`; every seed then draws a skin that
     /// the calibrated one may be. A scene or the specification of a data set may instead name a file written by `spts
     /// calibrate --skin`. Default: none.
     pub gains: Option<TaxelGains>,
@@ -69,6 +74,7 @@ impl Default for VelostatConfig {
             unloaded_s: 0.0,
             spread_log_sd: 0.30,
             session_log_sd: 0.10,
+            session_tilt_log_sd: 0.20,
             gains: None,
             temperature_c: REFERENCE_C,
             resistance_per_k: 0.004,
@@ -76,6 +82,13 @@ impl Default for VelostatConfig {
             creep: CreepConfig::default(),
             conditioning: Conditioning::default(),
         }
+    }
+}
+
+impl VelostatConfig {
+    /// What a new mounting of a skin without known gains changes.
+    pub fn mounting(&self) -> Mounting {
+        Mounting { log_sd: self.session_log_sd, tilt_log_sd: self.session_tilt_log_sd }
     }
 }
 
@@ -107,7 +120,8 @@ pub struct Velostat {
     conditioning: Conditioning,
     /// Factor on the conductance at the sheet's temperature.
     warmth: f64,
-    session: Spread,
+    mounting: Mounting,
+    skin: SkinLayout,
     streams: Streams,
     /// Fixed gain of every taxel.
     fixed: Vec<f64>,
@@ -134,26 +148,30 @@ impl Velostat {
     /// # Errors
     /// [`Refusal`] for a parameter outside its range.
     pub fn new(config: VelostatConfig, skin: &SkinLayout, streams: Streams) -> Result<Self, Refusal> {
+        let unknown = config.mounting();
         let c = config;
         in_interval("unloaded_s", c.unloaded_s, "[0, 1]")?;
         let hysteresis = Hysteresis::try_from(c.hysteresis)?;
         let creep = Creep::try_from(c.creep)?;
         let taxels = skin.taxels();
-        let (fixed, session_log_sd) = match &c.gains {
+        let (fixed, mounting) = match &c.gains {
             Some(gains) => {
                 gains.check_skin(skin)?;
-                (gains.draw(streams, "velostat/spread", 0), gains.mounting_log_sd)
+                (gains.draw(streams, "velostat/spread", 0), gains.mounting)
             }
             None => {
                 let fixed = Spread::new("spread_log_sd", c.spread_log_sd)?;
-                (fixed.gains(taxels, streams, "velostat/spread", 0), c.session_log_sd)
+                in_interval("session_log_sd", c.session_log_sd, "[0, 2]")?;
+                in_interval("session_tilt_log_sd", c.session_tilt_log_sd, "[0, 2]")?;
+                (fixed.gains(taxels, streams, "velostat/spread", 0), unknown)
             }
         };
         let mut sheet = Self {
             law: PressureLaw::new(c.reference_s, c.exponent, c.saturation_pa)?,
             unloaded_s: c.unloaded_s,
             warmth: conductance_factor(c.temperature_c, c.resistance_per_k)?,
-            session: Spread::new("session_log_sd", session_log_sd)?,
+            mounting,
+            skin: *skin,
             fixed,
             conditioning: c.conditioning.checked()?,
             taxels: Vec::with_capacity(taxels),
@@ -218,7 +236,11 @@ impl Transducer for Velostat {
     }
 
     fn start_session(&mut self, session: u64) {
-        let gains = self.session.gains(self.fixed.len(), self.streams, "velostat/session", session);
+        let [mut slopes, each] = ["velostat/tilt", "velostat/session"].map(|label| {
+            let mut rng = self.streams.rng(label, session);
+            move || -> f64 { StandardNormal.sample(&mut rng) }
+        });
+        let gains = self.mounting.factors(&self.skin, [slopes(), slopes()], each);
         let presses = self.conditioning.fresh();
         let taxel = |(fixed, session)| Taxel { gain: fixed * session, presses, loaded: false };
         self.taxels = self.fixed.iter().zip(gains).map(taxel).collect();
@@ -334,7 +356,7 @@ mod tests {
     fn the_spread_is_fixed_and_a_session_adds_to_it() {
         let skin = SkinLayout::new(100, 100, 15e-3, 10e-3).unwrap();
         let sheet = |seed, session_log_sd, session| {
-            let config = VelostatConfig { session_log_sd, ..VelostatConfig::default() };
+            let config = VelostatConfig { session_log_sd, session_tilt_log_sd: 0.0, ..VelostatConfig::default() };
             let mut sheet = Velostat::new(config, &skin, Streams::new(seed)).unwrap();
             sheet.start_session(session);
             sheet.gains().collect::<Vec<_>>()

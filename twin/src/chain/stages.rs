@@ -683,7 +683,12 @@ mod tests {
         let frames = [pressed(0.0), pressed(1.0)];
         let maps = |log_sd: f64, session| {
             let config = ChainConfig {
-                transducer_parameters: [("session_log_sd".to_owned(), log_sd.into())].into_iter().collect(),
+                transducer_parameters: [
+                    ("session_log_sd".to_owned(), log_sd.into()),
+                    ("session_tilt_log_sd".to_owned(), 0.0.into()),
+                ]
+                .into_iter()
+                .collect(),
                 ..ChainConfig::default()
             };
             let chain = Chain::new(&config, &SkinLayout::default(), 0, Path::new("")).unwrap();

@@ -286,7 +286,7 @@ impl<'a> Trainer<'a> {
                 };
                 let streams = self.streams.child("calibrated", 0);
                 let shown = on_skins_with(&gains, simulated, streams).map_err(|e| e.at("gains"))?;
-                self.learn(&shown, TrainingPresses::all, gain_sds(&gains), scored)
+                self.learn(&shown, TrainingPresses::all, gain_sds(&gains, &self.source.layout), scored)
             }
         }
     }
@@ -298,7 +298,8 @@ impl<'a> Trainer<'a> {
         let skin: Vec<TrainingPresses<'_>> = others.filter_map(TrainingPresses::unscored).collect();
         let twin: Vec<TrainingPresses<'_>> = simulated.iter().filter_map(TrainingPresses::all).collect();
         let of = |presses: &[TrainingPresses<'_>]| templates(presses).map_err(|e| e.at("library"));
-        let gains = SkinGains::estimate(&of(&skin)?, &of(&twin)?, VelostatConfig::default().session_log_sd);
+        let mounting = VelostatConfig::default().mounting();
+        let gains = SkinGains::estimate(&of(&skin)?, &of(&twin)?, &self.source.layout, mounting);
         Ok(gains.map_err(|e| e.at("gains"))?.gains)
     }
 

@@ -109,19 +109,19 @@ impl TrainingData {
 
     /// Training data for a skin whose gains are known. `simulated` are sessions pressed on a median skin, whose taxels
     /// all have gain 1; `gains` turns them into what skins with these gains would record, each press with gains drawn
-    /// anew within their uncertainty. The sheet has `cols` columns.
+    /// anew within their uncertainty. `layout` is that of the skin.
     ///
     /// # Errors
     /// As [`Self::new`]; [`Refusal`] if a gain makes a sample infinite.
     pub fn of_skin(
         simulated: &[ScoredSession],
         gains: &TaxelGains,
-        cols: usize,
+        layout: &SkinLayout,
         streams: Streams,
     ) -> Result<Self, Refusal> {
         let shown = on_skins_with(gains, simulated, streams.child("calibrated", 0)).map_err(|e| e.at("gains"))?;
         let training: Vec<TrainingPresses<'_>> = shown.iter().filter_map(TrainingPresses::all).collect();
-        Self::new(&training, cols, gain_sds(gains), streams)
+        Self::new(&training, layout.cols(), gain_sds(gains, layout), streams)
     }
 
     /// Training data from `images` (taxels × images) of a sheet with `cols` columns, and their `labels`. The dictionary

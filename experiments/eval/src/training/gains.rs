@@ -6,7 +6,7 @@ use rand_distr::{Distribution, StandardNormal};
 use serde::Serialize;
 use spts_circuit::Block;
 use spts_input::Refusal;
-use spts_models::{Streams, TaxelGains, VelostatConfig};
+use spts_models::{Mounting, SkinLayout, Streams, TaxelGains, VelostatConfig};
 use spts_recon::classify::Library;
 use spts_recon::metrics::pearson;
 
@@ -23,8 +23,8 @@ const LARGEST_FACTOR: f64 = 4.0;
 ///
 /// On the taxels touched in a simulated contact, log(v/m) = a + l + c + e. v is the image of the skin and m that of the
 /// simulation at gain 1. a is the unknown amplitude of the session. l ~ N(0, σ²) is the logarithm of the taxel's gain,
-/// the same in all sessions. c ~ N(0, σ_c²) is the error of this object's simulated contact. e ~ N(0, σₘ²) is the
-/// change by this mounting of the skin. σ and σ_c are fitted to the ratios; σₘ is given.
+/// the same in all sessions. c ~ N(0, σ_c²) is the error of this object's simulated contact. e is the change by this
+/// mounting of the skin, a plane included ([`Mounting`]). σ and σ_c are fitted to the ratios; the mounting is given.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct SkinGains {
     /// The posterior.
@@ -42,15 +42,23 @@ pub struct SkinGains {
 
 impl SkinGains {
     /// Estimates the gains from `skin`, one image for each session, and `simulated`, one image of the contact at gain 1
-    /// for each label. Labels that are not in both are ignored. `mounting_log_sd` is σₘ.
+    /// for each label. Labels that are not in both are ignored. `layout` is that of the skin.
     ///
     /// # Errors
-    /// [`Refusal`] if no label is in both, or the image sizes differ.
-    pub fn estimate(skin: &Library, simulated: &Library, mounting_log_sd: f64) -> Result<Self, Refusal> {
-        let taxels = skin.images().nrows();
-        if taxels != simulated.images().nrows() {
-            let found = simulated.images().nrows();
-            return Err(Refusal::new(format!("images of the skin have {taxels} taxels, simulated ones {found}")));
+    /// [`Refusal`] if no label is in both, or an image has not one value for each taxel.
+    pub fn estimate(
+        skin: &Library,
+        simulated: &Library,
+        layout: &SkinLayout,
+        mounting: Mounting,
+    ) -> Result<Self, Refusal> {
+        let taxels = layout.taxels();
+        let found = [skin, simulated].map(|library| library.images().nrows());
+        if found != [taxels; 2] {
+            let [skin, simulated] = found;
+            return Err(Refusal::new(format!(
+                "images of the skin have {skin} taxels, simulated ones {simulated}, and the skin {taxels}"
+            )));
         }
         let (mut ratios, mut count, mut sessions) = (Vec::new(), vec![0; taxels], 0);
         for (k, &object) in skin.labels().iter().enumerate() {
@@ -60,7 +68,7 @@ impl SkinGains {
             let logs = logs(&skin.images().column(k), &simulated.images().column(l));
             for &(taxel, log) in &logs {
                 count[taxel] += 1;
-                ratios.push(Ratio { session: sessions, object, taxel, log });
+                ratios.push(Ratio { session: sessions, object, taxel, place: layout.share_of_half(taxel), log });
             }
             sessions += usize::from(!logs.is_empty());
         }
@@ -71,14 +79,11 @@ impl SkinGains {
         fitted.sort_unstable();
         fitted.dedup();
         let model = MixedModel::new(ratios, taxels, sessions);
-        let effects = model.fitted(Effects {
-            gain: VelostatConfig::default().spread_log_sd,
-            contact: CONTACT_LOG_SD,
-            mounting: mounting_log_sd,
-        });
+        let effects =
+            model.fitted(Effects { gain: VelostatConfig::default().spread_log_sd, contact: CONTACT_LOG_SD, mounting });
         let solution = model.solve(effects);
         Ok(Self {
-            gains: TaxelGains { shape: None, log_mean: solution.mean, log_sd: solution.sd, mounting_log_sd },
+            gains: TaxelGains { shape: None, log_mean: solution.mean, log_sd: solution.sd, mounting },
             spread_log_sd: effects.gain,
             contact_log_sd: effects.contact,
             sessions: count,
@@ -107,14 +112,15 @@ pub const BAND_SD: f64 = 1.644_853_626_951_472_7;
 
 impl SkinGains {
     /// Compares `skin`, an image from the real skin, with `simulated`, the same contact on a skin of gain 1; both have
-    /// one value a taxel. `None` if fewer than two taxels are touched.
-    pub fn check(&self, skin: &[f64], simulated: &[f64]) -> Option<GainCheck> {
+    /// one value for each taxel of `layout`. `None` if fewer than two taxels are touched.
+    pub fn check(&self, skin: &[f64], simulated: &[f64], layout: &SkinLayout) -> Option<GainCheck> {
         let with_gains = simulated.iter().zip(&self.gains.log_mean).map(|(v, log)| v * log.exp());
         let with_gains: Vec<f64> = with_gains.collect();
         let logs = logs(skin, simulated);
         // what is left of a ratio without the gain, and its variance
         let left = logs.iter().map(|&(i, log)| {
-            let sd = self.gains.log_sd[i].hypot(self.contact_log_sd).hypot(self.gains.mounting_log_sd);
+            let mounting = self.gains.mounting.taxel_log_sd(layout.share_of_half(i));
+            let sd = self.gains.log_sd[i].hypot(self.contact_log_sd).hypot(mounting);
             (log - self.gains.log_mean[i], sd * sd)
         });
         let left: Vec<(f64, f64)> = left.collect();
@@ -147,7 +153,6 @@ pub fn on_skins_with(
     sessions: &[ScoredSession],
     streams: Streams,
 ) -> Result<Vec<ScoredSession>, Refusal> {
-    let session_gains = TaxelGains { log_sd: gains.session_log_sd().collect(), ..gains.clone() };
     let with_gains = |session: &ScoredSession| {
         let Some(raster) = &session.raster else {
             return Ok(session.clone());
@@ -155,9 +160,11 @@ pub fn on_skins_with(
         let blocks = raster.blocks().iter().enumerate().map(|(k, block)| {
             let mut rng = streams.rng("gains/skin", (k / 2) as u64);
             let sign = if k % 2 == 0 { 1.0 } else { -1.0 };
-            let normal =
-                std::iter::repeat_with(|| -> f64 { sign * Distribution::<f64>::sample(&StandardNormal, &mut rng) });
-            let of_taxels: Vec<f64> = session_gains.at(normal).collect();
+            let mut normals = move || sign * Distribution::<f64>::sample(&StandardNormal, &mut rng);
+            let fixed: Vec<f64> = gains.at(std::iter::repeat_with(&mut normals)).collect();
+            let slopes = [normals(), normals()];
+            let mounted = gains.mounting.factors(raster.layout(), slopes, normals);
+            let of_taxels: Vec<f64> = fixed.iter().zip(mounted).map(|(fixed, mounted)| fixed * mounted).collect();
             Block {
                 frame_position: block.frame_position,
                 idle_frames: block.idle_frames,
@@ -183,17 +190,17 @@ fn logs(skin: &[f64], simulated: &[f64]) -> Vec<(usize, f64)> {
     if scale > 0.0 && scale.is_finite() { touched.iter().map(log).collect() } else { Vec::new() }
 }
 
-/// γ of every taxel of a skin with these `gains` in one session: the relative standard deviation √(exp(σ²) − 1) of its
-/// log-normal gain.
-pub fn gain_sds(gains: &TaxelGains) -> Vec<f64> {
-    gains.session_log_sd().map(relative_sd).collect()
+/// γ of every taxel of a `skin` with these `gains` in one session: the relative standard deviation √(exp(σ²) − 1) of
+/// its log-normal gain.
+pub fn gain_sds(gains: &TaxelGains, skin: &SkinLayout) -> Vec<f64> {
+    gains.session_log_sd(skin).map(relative_sd).collect()
 }
 
 /// γ of an unknown skin: the relative standard deviation of its taxels' log-normal gains in one session, √(exp(σ² +
-/// σₛ²) − 1), with the transducer's σ = `spread_log_sd` and σₛ = `session_log_sd`.
+/// σₛ²) − 1), with the transducer's σ = `spread_log_sd` and σₛ of its [`Mounting`].
 pub fn simulated_gain_sd() -> f64 {
     let sheet = VelostatConfig::default();
-    relative_sd(sheet.spread_log_sd.hypot(sheet.session_log_sd))
+    relative_sd(sheet.spread_log_sd.hypot(sheet.mounting().mean_log_sd()))
 }
 
 /// Relative standard deviation √(exp(σ²) − 1) of a log-normal value whose logarithm has the standard deviation σ =
@@ -209,8 +216,9 @@ struct Ratio {
     session: usize,
     /// Number of the pressed object.
     object: usize,
-    /// Taxel.
+    /// Taxel, and its place along the rows and the columns ([`SkinLayout::share_of_half`]).
     taxel: usize,
+    place: [f64; 2],
     /// log(v/m).
     log: f64,
 }
@@ -222,8 +230,8 @@ struct Effects {
     gain: f64,
     /// σ_c of the error of a simulated contact on a taxel.
     contact: f64,
-    /// σₘ of the change of a taxel's gain by mounting the skin.
-    mounting: f64,
+    /// What mounting the skin changes: σₘ and τ.
+    mounting: Mounting,
 }
 
 /// What the ratios say under given effects.
@@ -237,8 +245,8 @@ struct Solution {
     log_likelihood: f64,
 }
 
-/// Ratios of sessions and taxels, r = a_s + l_i + c_oi + m_si with a_s of a flat density, l_i ~ N(0, σ²), c_oi ~
-/// N(0, σ_c²) shared by all sessions of an object, m_si ~ N(0, σₘ²), all independent.
+/// Ratios of sessions and taxels, r = a_s + p_s·u_i + q_s·v_i + l_i + c_oi + m_si with a_s of a flat density, p_s, q_s ~
+/// N(0, τ²), l_i ~ N(0, σ²), c_oi ~ N(0, σ_c²) shared by all sessions of an object, m_si ~ N(0, σₘ²), all independent.
 ///
 /// Source: S. R. Searle, G. Casella and C. E. McCulloch, *Variance Components* (1992), chapters 6 and 7 (restricted
 /// likelihood, prediction of random effects). Given the effects, the ratios of an object on a taxel have the covariance
@@ -263,14 +271,23 @@ impl MixedModel {
 
     /// Posterior of the gains, and the likelihood of the effects.
     fn solve(&self, effects: Effects) -> Solution {
-        let s = self.sessions;
-        let [prior, contact, mounting] =
-            [effects.gain, effects.contact, effects.mounting].map(|sd| sd.max(SMALLEST).powi(2));
+        // a level and two slopes of every session
+        let s = 3 * self.sessions;
+        let Mounting { log_sd, tilt_log_sd } = effects.mounting;
+        let [prior, contact, mounting, tilt] =
+            [effects.gain, effects.contact, log_sd, tilt_log_sd].map(|sd| sd.max(SMALLEST).powi(2));
         let (mut h, mut b) = (DMatrix::zeros(s, s), DVector::zeros(s));
         // of every taxel: its own precision and right side, and its coupling with the sessions
         let mut own = vec![(1.0 / prior, 0.0); self.taxels];
         let mut coupling = vec![DVector::zeros(s); self.taxels];
-        let (mut squares, mut log_determinant) = (0.0, 0.0);
+        let (mut squares, mut log_determinant) = (0.0, 2.0 * self.sessions as f64 * tilt.ln());
+        for slope in (0..s).filter(|k| k % 3 > 0) {
+            h[(slope, slope)] = 1.0 / tilt;
+        }
+        let of_session = |r: &Ratio| {
+            let [u, v] = r.place;
+            [(3 * r.session, 1.0), (3 * r.session + 1, u), (3 * r.session + 2, v)]
+        };
         for group in self.ratios.chunk_by(|a, b| (a.taxel, a.object) == (b.taxel, b.object)) {
             let n = group.len() as f64;
             let whole = mounting + n * contact;
@@ -284,11 +301,13 @@ impl MixedModel {
             for r in group {
                 let weighted = (r.log - rho * sum) / mounting;
                 squares += r.log * weighted;
-                b[r.session] += weighted;
-                coupling[taxel][r.session] += 1.0 / whole;
-                h[(r.session, r.session)] += 1.0 / mounting;
-                for other in group {
-                    h[(r.session, other.session)] -= rho / mounting;
+                for (k, x) in of_session(r) {
+                    b[k] += x * weighted;
+                    coupling[taxel][k] += x / whole;
+                    of_session(r).iter().for_each(|(l, y)| h[(k, *l)] += x * y / mounting);
+                    for (l, y) in group.iter().flat_map(of_session) {
+                        h[(k, l)] -= x * y * rho / mounting;
+                    }
                 }
             }
         }
@@ -375,6 +394,12 @@ mod tests {
     use spts_models::SkinLayout;
     use spts_recon::Matrix;
 
+    const MOUNTED: Mounting = Mounting { log_sd: 0.1, tilt_log_sd: 0.0 };
+
+    fn three() -> SkinLayout {
+        SkinLayout::new(1, 3, 15e-3, 10e-3).unwrap()
+    }
+
     fn library(images: &[&[f64]]) -> Library {
         let labels: Vec<usize> = (1..=images.len()).collect();
         Library::new(&Matrix::from_column_slices(3, images), &labels).unwrap()
@@ -388,7 +413,7 @@ mod tests {
         let a = 0.2_f64;
         let simulated = library(&[&[1.0, 1.0, 0.0], &[2.0, 2.0, 0.0]]);
         let skin = library(&[&[a.exp(), (-a).exp(), 0.0], &[a.exp(), (-a).exp(), 0.5]]);
-        let found = SkinGains::estimate(&skin, &simulated, 0.1).unwrap();
+        let found = SkinGains::estimate(&skin, &simulated, &three(), MOUNTED).unwrap();
         let ridge = (found.contact_log_sd.powi(2) + 0.1_f64.powi(2)) / found.spread_log_sd.powi(2);
         let mean = &found.gains.log_mean;
         let expected = 2.0 * a * 2.0 / (2.0 + ridge);
@@ -404,10 +429,10 @@ mod tests {
     fn what_has_no_pair_is_refused() {
         let one = library(&[&[1.0, 0.0, 0.0]]);
         let other = Library::new(&Matrix::from_column_slices(3, &[&[1.0, 0.0, 0.0]]), &[7]).unwrap();
-        let said = |simulated| SkinGains::estimate(&one, simulated, 0.1).unwrap_err().to_string();
+        let said = |simulated| SkinGains::estimate(&one, simulated, &three(), MOUNTED).unwrap_err().to_string();
         assert!(said(&other).contains("no object has both"));
         let larger = Library::new(&Matrix::from_column_slices(4, &[&[1.0; 4]]), &[1]).unwrap();
-        assert!(said(&larger).contains("have 3 taxels, simulated ones 4"));
+        assert!(said(&larger).contains("have 3 taxels, simulated ones 4, and the skin 3"));
     }
 
     /// A pair of presses has opposite deviations: the geometric mean of their images is that of the mean gains.
@@ -417,7 +442,7 @@ mod tests {
             shape: None,
             log_mean: vec![0.4, -0.2, 0.0],
             log_sd: vec![0.1, 0.3, 0.0],
-            mounting_log_sd: 0.1,
+            mounting: Mounting { log_sd: 0.1, tilt_log_sd: 0.2 },
         };
         let layout = SkinLayout::new(1, 3, 5e-3, 3e-3).unwrap();
         let info = RecordingInfo::new(layout, Weights::new(WeightMode::Raster, Seeding::Mixed, 3), 64_300.0);
@@ -445,18 +470,23 @@ mod tests {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let mut normal = || -> f64 { StandardNormal.sample(&mut rng) };
         let gains: Vec<f64> = (0..taxels).map(|_| effects.gain * normal()).collect();
+        let layout = SkinLayout::new(taxels / 5, 5, 15e-3, 10e-3).unwrap();
         let mut ratios = Vec::new();
         for object in 0..objects {
             let sessions = object..object + 1 + usize::from(object + 1 == objects);
-            let amplitudes = [normal(), normal()];
+            let levels = [normal(), normal()];
+            let slopes = [[normal(), normal()], [normal(), normal()]];
             for (taxel, gain) in gains.iter().enumerate() {
                 if (taxel + object) % 3 == 0 {
                     continue;
                 }
                 let contact = effects.contact * normal();
                 for session in sessions.clone() {
-                    let log = amplitudes[session - object] + gain + contact + effects.mounting * normal();
-                    ratios.push(Ratio { session, object, taxel, log });
+                    let place = layout.share_of_half(taxel);
+                    let slope: f64 = slopes[session - object].iter().zip(place).map(|(slope, x)| slope * x).sum();
+                    let mounting = effects.mounting.log_sd * normal() + effects.mounting.tilt_log_sd * slope;
+                    let log = levels[session - object] + gain + contact + mounting;
+                    ratios.push(Ratio { session, object, taxel, place, log });
                 }
             }
         }
@@ -467,8 +497,8 @@ mod tests {
     /// likelihood −½(log|V| + log|Xᵀ V⁻¹ X| + rᵀ P r).
     #[test]
     fn the_solution_is_that_of_dense_matrices() {
-        let effects = Effects { gain: 0.3, contact: 0.35, mounting: 0.1 };
-        let (taxels, sessions) = (7, 5);
+        let effects = Effects { gain: 0.3, contact: 0.35, mounting: Mounting { log_sd: 0.1, tilt_log_sd: 0.4 } };
+        let (taxels, sessions) = (10, 5);
         let (ratios, _) = planted(effects, taxels, sessions - 1, 5);
         let model = MixedModel::new(ratios, taxels, sessions);
         let (r, n) = (&model.ratios, model.ratios.len());
@@ -477,7 +507,9 @@ mod tests {
             let taxel = r[i].taxel == r[j].taxel;
             same(taxel, effects.gain)
                 + same(taxel && r[i].object == r[j].object, effects.contact)
-                + same(i == j, effects.mounting)
+                + same(i == j, effects.mounting.log_sd)
+                + same(r[i].session == r[j].session, effects.mounting.tilt_log_sd)
+                    * (r[i].place[0] * r[j].place[0] + r[i].place[1] * r[j].place[1])
         });
         let x = DMatrix::from_fn(n, sessions, |i, s| f64::from(u8::from(r[i].session == s)));
         let z = DMatrix::from_fn(n, taxels, |i, k| f64::from(u8::from(r[i].taxel == k)));
@@ -503,7 +535,7 @@ mod tests {
     /// 400 ± 5 √800.
     #[test]
     fn planted_effects_are_found() {
-        let effects = |gain, contact| Effects { gain, contact, mounting: 0.1 };
+        let effects = |gain, contact| Effects { gain, contact, mounting: Mounting { log_sd: 0.1, tilt_log_sd: 0.2 } };
         let expected = effects(0.25, 0.45);
         let (ratios, gains) = planted(expected, 400, 12, 8);
         let model = MixedModel::new(ratios, 400, 13);

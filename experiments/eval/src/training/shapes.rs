@@ -164,7 +164,7 @@ impl PoseKnowledge {
              rotation_deg = {{ normal = [{rotation_deg:e}, {:e}] }}\n\
              tilt_x_deg = {{ normal = [0.0, {tilt:e}] }}\ntilt_y_deg = {{ normal = [0.0, {tilt:e}] }}\n\
              [skin]\nrows = {}\ncols = {}\npitch_m = {:e}\nelectrode_m = {:e}\n\
-             [transducer]\nspread_log_sd = 0.0\nsession_log_sd = 0.0\n\
+             [transducer]\nspread_log_sd = 0.0\nsession_log_sd = 0.0\nsession_tilt_log_sd = 0.0\n\
              [record]\nmeasurements = 1\nraster = false\nlabels = []\n",
             rng.next_u64() >> 2,
             object.name,

@@ -14,7 +14,7 @@ use spts::session::{Event, Recorded};
 use spts_circuit::{Block, Mode, Recording};
 use spts_contact::objects::{OBJECTS, ObjectSpec};
 use spts_input::Refusal;
-use spts_models::{SkinLayout, Streams, VelostatConfig, in_range};
+use spts_models::{Mounting, SkinLayout, Streams, VelostatConfig, in_range};
 use std::path::Path;
 
 /// How simulated skins and presses vary.
@@ -35,9 +35,8 @@ pub struct Skins {
     /// Standard deviation, from taxel to taxel, of the natural logarithm of a taxel's gain that is the same in all
     /// sessions of a skin; [0, 2].
     pub spread_log_sd: f64,
-    /// Standard deviation of the natural logarithm of a taxel's gain that is drawn anew for each session of a skin; [0,
-    /// 2].
-    pub session_log_sd: f64,
+    /// What the mounting of a skin changes anew for each session.
+    pub mounting: Mounting,
     /// Standard deviation of an object's position along each axis, m; [0, 0.01].
     pub position_sd_m: f64,
     /// Standard deviation of an object's rotation about each axis, degrees; [0, 5].
@@ -55,7 +54,7 @@ impl Default for Skins {
             layout: SkinLayout::default(),
             skins: 32,
             spread_log_sd: sheet.spread_log_sd,
-            session_log_sd: sheet.session_log_sd,
+            mounting: sheet.mounting(),
             position_sd_m: press.position_sd_m,
             rotation_sd_deg: press.rotation_sd_deg,
             readout: DEFAULT_READOUT,
@@ -67,7 +66,7 @@ impl Skins {
     /// Presses on the same number of median skins, which differ only by the arm's repeatability. They are scanned
     /// without readout faults, because y = Φx refers to the true images.
     pub fn median(layout: SkinLayout) -> Self {
-        Self { layout, spread_log_sd: 0.0, session_log_sd: 0.0, readout: "ideal", ..Self::default() }
+        Self { layout, spread_log_sd: 0.0, mounting: Mounting::default(), readout: "ideal", ..Self::default() }
     }
 }
 
@@ -119,8 +118,13 @@ impl Skins {
             press.rotation_sd_deg = self.rotation_sd_deg;
         }
         config.skin = self.layout;
-        config.transducer_parameters.insert("spread_log_sd".to_owned(), self.spread_log_sd.into());
-        config.transducer_parameters.insert("session_log_sd".to_owned(), self.session_log_sd.into());
+        for (name, log_sd) in [
+            ("spread_log_sd", self.spread_log_sd),
+            ("session_log_sd", self.mounting.log_sd),
+            ("session_tilt_log_sd", self.mounting.tilt_log_sd),
+        ] {
+            config.transducer_parameters.insert(name.to_owned(), log_sd.into());
+        }
         config.readout = Some(self.readout.to_owned());
         let scene = Scene::new(config, Path::new(""))?;
         let index = usize::from(object.label);
@@ -153,7 +157,7 @@ mod tests {
         let skins = Skins {
             skins: 2,
             spread_log_sd: 0.30,
-            session_log_sd: 0.10,
+            mounting: Mounting { log_sd: 0.10, tilt_log_sd: 0.0 },
             position_sd_m: 0.0,
             rotation_sd_deg: 0.0,
             ..Skins::default()

@@ -5,6 +5,7 @@ use super::windows::{OUTLIER_SD, Reseeded, TAPS, WINDOW_FRAMES, fit_windows};
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
 use spts_circuit::{Recording, WeightMode};
+use spts_models::SkinLayout;
 use std::ops::Range;
 
 /// Correlation of the residual with a foreign sequence, in standard errors, that is believed. The memory of the taxels'
@@ -303,10 +304,56 @@ pub struct SessionGains {
     pub log_sd: f64,
     /// Standard error of `log_sd`: log_sd/√(2(n − 1)) for n Gaussian values.
     pub standard_error: f64,
+    /// The plane in ln gain; `None` with too few loaded taxels, or all of them in one row or column.
+    pub plane: Option<GainPlane>,
 }
 
-/// Gains of the taxels of `compressive_v`, leaving out those in `faulty`. `None` with fewer than three loaded taxels.
-pub(super) fn gains(compressive_v: &[f64], raster_v: &[f64], faulty: &[usize]) -> Option<SessionGains> {
+/// Plane through the logarithms of gains, by least squares.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct GainPlane {
+    /// Slopes along the rows and along the columns, from the middle of the sheet to its edge.
+    pub slopes: [f64; 2],
+    /// Their standard errors.
+    pub standard_errors: [f64; 2],
+    /// Standard deviation of ln gain about the plane, with n − 3 degrees of freedom.
+    pub log_sd: f64,
+}
+
+/// Fewest loaded taxels that a plane is fitted to: twice its parameters.
+const FEWEST_IN_PLANE: usize = 6;
+
+impl GainPlane {
+    /// The plane through `logs`, (taxel, ln gain), of `skin`.
+    fn through(logs: &[(usize, f64)], skin: &SkinLayout) -> Option<Self> {
+        if logs.len() < FEWEST_IN_PLANE {
+            return None;
+        }
+        let row = |taxel: usize| {
+            let [u, v] = skin.share_of_half(taxel);
+            SVector::from([1.0, u, v])
+        };
+        let (mut normal, mut moments) = (SMatrix::<f64, 3, 3>::zeros(), SVector::<f64, 3>::zeros());
+        for &(taxel, log) in logs {
+            normal += row(taxel) * row(taxel).transpose();
+            moments += row(taxel) * log;
+        }
+        let inverse = normal.cholesky()?.inverse();
+        let plane = inverse * moments;
+        let squares: f64 = logs.iter().map(|&(taxel, log)| (log - row(taxel).dot(&plane)).powi(2)).sum();
+        let log_sd = (squares / (logs.len() as f64 - 3.0)).sqrt();
+        let error = |k: usize| log_sd * inverse[(k, k)].sqrt();
+        Some(Self { slopes: [plane[1], plane[2]], standard_errors: [error(1), error(2)], log_sd })
+    }
+}
+
+/// Gains of the taxels of `compressive_v` on `skin`, leaving out those in `faulty`. `None` with fewer than three loaded
+/// taxels.
+pub(super) fn gains(
+    compressive_v: &[f64],
+    raster_v: &[f64],
+    faulty: &[usize],
+    skin: &SkinLayout,
+) -> Option<SessionGains> {
     let limit = |image: &[f64]| LOADED * image.iter().copied().fold(0.0, f64::max);
     let (least_c, least_r) = (limit(compressive_v), limit(raster_v));
     let loaded: Vec<(usize, f64)> = compressive_v
@@ -324,6 +371,7 @@ pub(super) fn gains(compressive_v: &[f64], raster_v: &[f64], faulty: &[usize]) -
     let log_sd = sd(&logs) * (logs.len() as f64 / freedom).sqrt();
     let relative = |(taxel, log): (usize, f64)| TaxelGain { taxel, gain: (log - centre).exp() };
     Some(SessionGains {
+        plane: GainPlane::through(&loaded, skin),
         taxels: loaded.into_iter().map(relative).collect(),
         log_sd,
         standard_error: log_sd / (2.0 * freedom).sqrt(),
@@ -340,7 +388,8 @@ mod tests {
         let raster = [1.0, 2.0, 0.05, 1.5, 0.0, 1.0];
         // twice the raster image, times e^±0.1 on two taxels; one is faulty, one idle
         let compressive = [2.0 * 0.1_f64.exp(), 4.0, 3.0, 3.0 * (-0.1_f64).exp(), 0.0, 9.0];
-        let found = gains(&compressive, &raster, &[5]).unwrap();
+        let skin = SkinLayout::with_pitch(1, 6, 15e-3).unwrap();
+        let found = gains(&compressive, &raster, &[5], &skin).unwrap();
         let gain: Vec<f64> = found.taxels.iter().map(|t| t.gain.ln()).collect();
         for (found, expected) in gain.iter().zip([0.1, 0.0, -0.1]) {
             assert_relative_eq!(*found, expected, epsilon = 1e-12);
@@ -349,6 +398,33 @@ mod tests {
         // (0.01 + 0 + 0.01)/2
         assert_relative_eq!(found.log_sd, 0.1, max_relative = 1e-12);
         assert_relative_eq!(found.standard_error, 0.05, max_relative = 1e-12);
-        assert_eq!(gains(&compressive, &raster, &[0, 5]), None);
+        assert_eq!(found.plane, None, "three taxels have none");
+        assert_eq!(gains(&compressive, &raster, &[0, 5], &skin), None);
+    }
+
+    /// Nine taxels at u, v = -2/3, 0, 2/3 with a plane and a deviation that is orthogonal to it: slopes are exact, the
+    /// deviation's squares 4·0.1² have six degrees of freedom, and the error of a slope is sd/√(6·(2/3)²).
+    #[test]
+    fn a_plane_is_found_with_its_errors() {
+        let skin = SkinLayout::with_pitch(3, 3, 15e-3).unwrap();
+        let corners = [1.0, 0.0, -1.0, 0.0, 0.0, 0.0, -1.0, 0.0, 1.0];
+        let log = |k: usize| {
+            let [u, v] = skin.share_of_half(k);
+            0.7 + 0.5 * u - 0.2 * v + 0.1 * corners[k]
+        };
+        let found = GainPlane::through(&(0..9).map(|k| (k, log(k))).collect::<Vec<_>>(), &skin).unwrap();
+        let sd = (0.04_f64 / 6.0).sqrt();
+        let error = sd / (6.0_f64 * 4.0 / 9.0).sqrt();
+        for (found, expected) in [
+            (found.slopes[0], 0.5),
+            (found.slopes[1], -0.2),
+            (found.log_sd, sd),
+            (found.standard_errors[0], error),
+            (found.standard_errors[1], error),
+        ] {
+            assert_relative_eq!(found, expected, max_relative = 1e-12);
+        }
+        let row: Vec<(usize, f64)> = (0..8).map(|k| (k, 0.1)).collect();
+        assert_eq!(GainPlane::through(&row, &SkinLayout::with_pitch(1, 8, 15e-3).unwrap()), None);
     }
 }

@@ -34,12 +34,12 @@ mod statistics;
 mod tests;
 mod windows;
 
-pub use cells::{CellFault, Overdriven, SessionGains, TaxelGain, reseeded};
+pub use cells::{CellFault, GainPlane, Overdriven, SessionGains, TaxelGain, reseeded};
 pub use late::{Beat, LateCell};
 pub use predict::{COVERAGE, PredictedInside, PredictedNumber, predicted};
 pub use press::{MissedPress, NUMBERS};
 pub use profile::{FittedParameter, FittedReadout, NOT_IDENTIFIABLE, NOT_MODELLED, fitted_profile};
-pub use skin::{Mounting, ObjectCheck, SkinReport, SkinStudy};
+pub use skin::{ObjectCheck, Remounted, SkinReport, SkinStudy};
 pub use statistics::{ConverterSteps, Estimated, quantiles};
 pub(crate) use windows::fit_windows;
 pub use windows::{Reseeded, WINDOW_FRAMES};
@@ -359,7 +359,7 @@ impl SessionEstimates {
             beats: beats(&analysed),
             overdriven,
             faults,
-            gains: contact.and_then(|raster_v| gains(&image_v, &raster_v, &faulty)),
+            gains: contact.and_then(|raster_v| gains(&image_v, &raster_v, &faulty, recording.layout())),
             image_v,
             output_quantiles_v: quantiles(&plateau_volts(recording, hold, &used), QUANTILES),
             clean_v: analysed.into_iter().flat_map(|(_, press)| press.clean_v).collect(),

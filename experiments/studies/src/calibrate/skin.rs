@@ -2,7 +2,7 @@
 //! pressures.
 
 use super::statistics::middle;
-use super::{CalibrationStudy, SessionEstimates, read};
+use super::{CalibrationStudy, GainPlane, SessionEstimates, read};
 use serde::Serialize;
 use spts::chain::{ChainConfig, SkinSession};
 use spts::data::SessionSet;
@@ -12,7 +12,7 @@ use spts_contact::objects::OBJECTS;
 use spts_eval::training::{BAND_SD, GainCheck, SkinGains, Skins, TrainingPresses, templates};
 use spts_eval::{ScoredSession, Source};
 use spts_input::Refusal;
-use spts_models::{Streams, TaxelGains, VelostatConfig};
+use spts_models::{Mounting, Streams, TaxelGains, VelostatConfig};
 use spts_recon::Matrix;
 use spts_recon::classify::Library;
 use spts_recon::statistics::mean;
@@ -42,9 +42,9 @@ pub struct SkinReport {
     /// Posterior of the gains, and the standard deviations of the random effects.
     #[serde(flatten)]
     pub skin: SkinGains,
-    /// Sessions from which the standard deviation of mountings is estimated. Empty if no session has both recordings;
-    /// the transducer's default is then used.
-    pub mountings: Vec<Mounting>,
+    /// Sessions from which the mounting is estimated. Empty if no session has both recordings; the transducer's default
+    /// is then used.
+    pub mountings: Vec<Remounted>,
     /// Sessions in which all presses are scored, so that scored presses had to be used.
     pub scored: Vec<String>,
     /// For every object, how well it is predicted with the gains estimated from the other objects.
@@ -53,11 +53,13 @@ pub struct SkinReport {
 
 /// Change of the gains by mounting the skin, from two sessions with one object.
 #[derive(Debug, Clone, PartialEq, Serialize)]
-pub struct Mounting {
+pub struct Remounted {
     /// Session.
     pub session: String,
-    /// Standard deviation of the logarithm of a taxel's gain in one session.
+    /// Standard deviation of the logarithm of a taxel's gain in one session, about the plane if there is one.
     pub log_sd: f64,
+    /// The plane in the logarithm of the ratio of the two sessions' gains; `None` with fewer than six loaded taxels.
+    pub plane: Option<GainPlane>,
 }
 
 /// A simulated image compared with that of the skin, without and with the gains estimated from other objects.
@@ -85,8 +87,7 @@ impl SkinStudy {
             )));
         }
         let mountings = mountings(root, progress)?;
-        let logs: Vec<f64> = mountings.iter().map(|m| m.log_sd).collect();
-        let mounting_log_sd = if logs.is_empty() { VelostatConfig::default().session_log_sd } else { middle(&logs) };
+        let mounting = mounting(&mountings);
         let known = known_pressures(root, &source)?;
         let is_known = |s: &ScoredSession| s.raster.is_none() || known.iter().any(|known| known.label == s.label);
         let simulated = if source.sessions.iter().all(is_known) {
@@ -101,7 +102,7 @@ impl SkinStudy {
         let simulated = with_known(&simulated, &known, source.layout.taxels())?;
         let estimate = |used: &dyn Fn(&ScoredSession) -> bool| -> Result<SkinGains, Refusal> {
             let skin = without_offsets(&images(&source.sessions, used)?, &known)?;
-            SkinGains::estimate(&skin, &simulated, mounting_log_sd).map_err(unknown_gains)
+            SkinGains::estimate(&skin, &simulated, &source.layout, mounting).map_err(unknown_gains)
         };
         let mut objects = Vec::new();
         for session in source.sessions.iter().filter(|s| s.raster.is_some() && !s.again) {
@@ -113,7 +114,7 @@ impl SkinStudy {
             let Some(k) = simulated.labels().iter().position(|l| *l == session.label) else {
                 continue;
             };
-            if let Some(check) = others.check(&own.images().column(0), &simulated.images().column(k)) {
+            if let Some(check) = others.check(&own.images().column(0), &simulated.images().column(k), &source.layout) {
                 objects.push(ObjectCheck { object: session.object.clone(), check });
             }
         }
@@ -232,20 +233,40 @@ fn presses(session: &ScoredSession) -> Option<TrainingPresses<'_>> {
 }
 
 /// What a mounting changes, from every session with both recordings of one object.
-fn mountings(root: &Path, progress: &dyn Progress) -> Result<Vec<Mounting>, Refusal> {
+fn mountings(root: &Path, progress: &dyn Progress) -> Result<Vec<Remounted>, Refusal> {
     let study = CalibrationStudy { session: None, presses: Some(MOUNTED_PRESSES) };
     // the recordings in `root` have been read before: those that are refused now are none to fit a readout to
     let Ok(pairs) = read(root) else { return Ok(Vec::new()) };
     let sessions = study.fit_all(pairs, progress)?.sessions;
     let mounting = |session: SessionEstimates| {
         let both = session.gains?;
-        Some(Mounting {
+        Some(Remounted {
             session: session.session,
             // two sessions differ by √2 of it
-            log_sd: both.log_sd / std::f64::consts::SQRT_2,
+            log_sd: both.plane.map_or(both.log_sd, |plane| plane.log_sd) / std::f64::consts::SQRT_2,
+            plane: both.plane,
         })
     };
     Ok(sessions.into_iter().filter_map(mounting).collect())
+}
+
+/// What a mounting changes by `sessions`: the median of their deviations, and the τ at which their slopes, each
+/// ~ N(0, 2τ² + its error²), are most likely. The transducer's defaults stand in for what no session tells.
+fn mounting(sessions: &[Remounted]) -> Mounting {
+    let unknown = VelostatConfig::default().mounting();
+    let logs: Vec<f64> = sessions.iter().map(|m| m.log_sd).collect();
+    let planes = sessions.iter().filter_map(|m| m.plane);
+    let slopes: Vec<(f64, f64)> = planes.flat_map(|p| p.slopes.into_iter().zip(p.standard_errors)).collect();
+    let unlikely = |tilt: f64| -> f64 {
+        let variance = |error: f64| 2.0 * tilt * tilt + error * error;
+        slopes.iter().map(|&(slope, error)| variance(error).ln() + slope * slope / variance(error)).sum()
+    };
+    let tilts = (0..=200).map(|k| f64::from(k) / 100.0);
+    let likeliest = tilts.min_by(|a, b| unlikely(*a).total_cmp(&unlikely(*b)));
+    Mounting {
+        log_sd: if logs.is_empty() { unknown.log_sd } else { middle(&logs) },
+        tilt_log_sd: likeliest.filter(|_| !slopes.is_empty()).unwrap_or(unknown.tilt_log_sd),
+    }
 }
 
 impl SkinReport {
