@@ -11,10 +11,11 @@ use spts_input::Refusal;
 /// Builds Gaussian classes from images: u ~ N(t, Σ), where t is the image scaled to a maximum of 1, a the blurred
 /// image, and
 ///
-/// Σᵢⱼ = m² aᵢ aⱼ (ρ exp(−dᵢⱼ²/2ℓ²) + (1 − ρ) δᵢⱼ) + γᵢ² tᵢ² δᵢⱼ + f² δᵢⱼ,
+/// Σᵢⱼ = m² aᵢ aⱼ (ρ exp(−dᵢⱼ²/2ℓ²) + (1 − ρ) δᵢⱼ) + θ² tᵢ tⱼ (uᵢ uⱼ + vᵢ vⱼ) + γᵢ² tᵢ² δᵢⱼ + f² δᵢⱼ,
 ///
-/// where d is the distance of two taxels, and γᵢ is 0 for images of the same skin. Of the smooth part and the gains'
-/// part only the `rank` largest eigenvectors are kept. The rest, the other independent parts and the noise of a
+/// where d is the distance of two taxels, u and v, from −1 to 1, are a taxel's place along the rows and the columns of
+/// the sheet, and γᵢ is 0 for images of the same skin. θ is the tilt between two mountings of the skin. Of the smooth
+/// part, the tilt and the gains' part only the `rank` largest eigenvectors are kept. The rest, the other independent parts and the noise of a
 /// measurement are treated as white (see [`Component`]).
 ///
 /// ```
@@ -36,6 +37,9 @@ pub struct TemplateModel {
     /// γ: relative standard deviation of every taxel's gain compared with that in the images, one value a taxel in [0,
     /// 10]; empty for images of the same skin.
     pub gains: Vec<f64>,
+    /// θ: standard deviation of the slopes of a plane in the logarithm of the gains, from the middle of the sheet to its
+    /// edge, by which two mountings of the skin differ, [0, 10].
+    pub tilt: f64,
     /// Standard deviation of the noise of one measurement, relative to the image's maximum, [1e-6, 1e5].
     pub noise: f64,
     /// Number of eigenvectors of the smooth part that are kept.
@@ -44,6 +48,8 @@ pub struct TemplateModel {
     pub reach: usize,
 }
 
+/// θ of the skin's mountings: √2 times the slopes' deviation of one, .20 (`spts calibrate --skin`).
+const TILT: f64 = 0.28;
 /// m: standard deviation of an image's values relative to the blurred image.
 const MISMATCH: f64 = 0.22;
 /// Standard deviation of the blur, taxels.
@@ -58,7 +64,7 @@ const FLOOR: f64 = 0.025;
 impl TemplateModel {
     /// Values for presses that are repeated accurately. `noise` also covers the differences between sessions.
     pub fn new(cols: usize) -> Self {
-        Self { cols, gains: Vec::new(), noise: 0.4, rank: 8, reach: 0 }
+        Self { cols, gains: Vec::new(), tilt: TILT, noise: 0.4, rank: 8, reach: 0 }
     }
 
     /// Values for a classifier with the outcome "unknown". Its classes are so wide that an unusual press of an object
@@ -75,6 +81,7 @@ impl TemplateModel {
 
     fn check(&self, taxels: usize) -> Result<(), Refusal> {
         within("noise", self.noise, 1e-6, 1e5)?;
+        within("tilt", self.tilt, 0.0, 10.0)?;
         if !self.gains.is_empty() && self.gains.len() != taxels {
             return Err(other_length("gains", self.gains.len(), taxels));
         }
@@ -176,13 +183,19 @@ impl TemplateModel {
     /// Smooth part of Σ and variances of the independent one, for the template `mean`.
     pub(super) fn covariance(&self, mean: &[f64]) -> (DMatrix<f64>, Vec<f64>) {
         let deviation: Vec<f64> = self.blur(mean).iter().map(|v| MISMATCH * v).collect();
+        let (rows, cols) = (mean.len() / self.cols, self.cols);
+        let along = |index: usize, count: usize| (2 * index + 1) as f64 / count as f64 - 1.0;
+        let tilted = |i: usize| [along(i / cols, rows), along(i % cols, cols)].map(|place| self.tilt * mean[i] * place);
+        let tilted: Vec<[f64; 2]> = (0..mean.len()).map(tilted).collect();
         let smooth = DMatrix::from_fn(mean.len(), mean.len(), |i, j| {
             let d2 = distance_squared(i, j, self.cols);
             let gain = match self.gains.get(i) {
                 Some(gain) if i == j => gain * mean[i],
                 _ => 0.0,
             };
-            SMOOTH_SHARE * deviation[i] * deviation[j] * (-d2 / (2.0 * LENGTH_PX.powi(2))).exp() + gain * gain
+            SMOOTH_SHARE * deviation[i] * deviation[j] * (-d2 / (2.0 * LENGTH_PX.powi(2))).exp()
+                + (tilted[i][0] * tilted[j][0] + tilted[i][1] * tilted[j][1])
+                + gain * gain
         });
         let independent = deviation.iter().map(|a| (1.0 - SMOOTH_SHARE) * a * a + FLOOR.powi(2));
         (smooth, independent.collect())
@@ -253,14 +266,18 @@ mod tests {
     /// With every eigenvector kept, F Fᵀ is the smooth part and the rest is white: together the stated Σ's trace.
     #[test]
     fn covariance_is_the_stated_one() {
-        let model = TemplateModel { rank: 12, ..TemplateModel::new(4) };
+        let model = TemplateModel { rank: 12, tilt: 0.3, ..TemplateModel::new(4) };
         let c = &model.classes(&library()).unwrap()[0];
         let (t, a) = (&c.mean, model.blur(&c.mean));
         assert!((t.iter().copied().fold(0.0, f64::max) - 1.0).abs() < 1e-15);
         for i in 0..12 {
             for j in 0..12 {
                 let got: f64 = c.factors.iter().map(|f| f[i] * f[j]).sum();
-                let expected = 0.22_f64.powi(2) * 0.8 * a[i] * a[j] * (-distance_squared(i, j, 4) / 8.0).exp();
+                // three rows and four columns
+                let place = |k: usize| [(k / 4) as f64 * 2.0 / 3.0 - 2.0 / 3.0, (k % 4) as f64 / 2.0 - 0.75];
+                let tilt = 0.09 * t[i] * t[j] * (place(i)[0] * place(j)[0] + place(i)[1] * place(j)[1]);
+                let smooth = 0.22_f64.powi(2) * 0.8 * a[i] * a[j] * (-distance_squared(i, j, 4) / 8.0).exp();
+                let expected = smooth + tilt;
                 // an eigendecomposition of a matrix of norm below 1
                 assert!((got - expected).abs() < 1e-14, "({i}, {j}): {got}, expected {expected}");
             }
