@@ -146,12 +146,14 @@ impl TemplateModel {
     }
 
     /// A component for objects of no class: mean and sample covariance of all images of `library`, each scaled to a
-    /// maximum of 1, unshifted and shifted by one taxel in every direction.
+    /// maximum of 1, unshifted and shifted by one taxel in every direction, and tilted as by a mounting.
     ///
     /// # Errors
     /// As [`Self::classes`].
     pub fn unknown(&self, library: &Library) -> Result<Component, Refusal> {
-        let (mean, covariance) = self.moments(library)?;
+        let (mean, mut covariance) = self.moments(library)?;
+        let n = mean.len();
+        covariance += DMatrix::from_fn(n, n, |i, j| self.tilt(i, j, n) * (covariance[(i, j)] + mean[i] * mean[j]));
         let (factors, rest) = principal(covariance, self.rank);
         let independent = mean.len() as f64 * FLOOR.powi(2);
         Ok(Component {
@@ -183,10 +185,6 @@ impl TemplateModel {
     /// Smooth part of Σ and variances of the independent one, for the template `mean`.
     pub(super) fn covariance(&self, mean: &[f64]) -> (DMatrix<f64>, Vec<f64>) {
         let deviation: Vec<f64> = self.blur(mean).iter().map(|v| MISMATCH * v).collect();
-        let (rows, cols) = (mean.len() / self.cols, self.cols);
-        let along = |index: usize, count: usize| (2 * index + 1) as f64 / count as f64 - 1.0;
-        let tilted = |i: usize| [along(i / cols, rows), along(i % cols, cols)].map(|place| self.tilt * mean[i] * place);
-        let tilted: Vec<[f64; 2]> = (0..mean.len()).map(tilted).collect();
         let smooth = DMatrix::from_fn(mean.len(), mean.len(), |i, j| {
             let d2 = distance_squared(i, j, self.cols);
             let gain = match self.gains.get(i) {
@@ -194,11 +192,19 @@ impl TemplateModel {
                 _ => 0.0,
             };
             SMOOTH_SHARE * deviation[i] * deviation[j] * (-d2 / (2.0 * LENGTH_PX.powi(2))).exp()
-                + (tilted[i][0] * tilted[j][0] + tilted[i][1] * tilted[j][1])
+                + self.tilt(i, j, mean.len()) * mean[i] * mean[j]
                 + gain * gain
         });
         let independent = deviation.iter().map(|a| (1.0 - SMOOTH_SHARE) * a * a + FLOOR.powi(2));
         (smooth, independent.collect())
+    }
+
+    /// θ² (uᵢ uⱼ + vᵢ vⱼ) of two taxels on a sheet of so many.
+    fn tilt(&self, i: usize, j: usize, taxels: usize) -> f64 {
+        let along = |index: usize, count: usize| (2 * index + 1) as f64 / count as f64 - 1.0;
+        let place = |k: usize| [along(k / self.cols, taxels / self.cols), along(k % self.cols, self.cols)];
+        let ([u, v], [u_j, v_j]) = (place(i), place(j));
+        self.tilt.powi(2) * (u * u_j + v * v_j)
     }
 
     /// Gaussian blur with zeros around the image.

@@ -238,7 +238,8 @@ pub(super) fn planted() -> (EvidenceClassifier, Vec<Vec<f64>>) {
     let shape = |taxels: &[usize]| (0..36).map(|i| if taxels.contains(&i) { 1.0 } else { 0.0 }).collect::<Vec<f64>>();
     let images = vec![shape(&[7, 8, 13, 14]), shape(&[21, 22, 23, 24, 27, 28]), shape(&[10, 16, 22, 28])];
     let library = Library::new(&Matrix::from_column_slices(36, &images), &[3, 1, 2]).unwrap();
-    let model = TemplateModel::new(6);
+    // all windows are of one mounting
+    let model = TemplateModel { tilt: 0.0, ..TemplateModel::new(6) };
     let mut components = model.classes(&library).unwrap();
     components.push(model.unknown(&library).unwrap());
     (EvidenceClassifier::new(&components, range(), 0.05).unwrap(), images)
