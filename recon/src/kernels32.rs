@@ -13,6 +13,9 @@ pub(crate) const LANES: usize = 8;
 const ROWS: usize = 4;
 /// Slices that are passed over at a time: as many as the first cache holds.
 const BLOCK: usize = 64;
+/// Spans of [`span_squares`] are shorter, the first eight shorter than `SHORT`; it reads so many numbers and a lane.
+pub(crate) const LONG: usize = 128;
+const SHORT: usize = 16;
 
 type Lane = [f32; LANES];
 
@@ -44,6 +47,27 @@ fn lanes<const G: usize>(values: &[f32]) -> [Lane; G] {
 fn total(v: Lane) -> f32 {
     let half: [f32; 4] = std::array::from_fn(|l| v[l] + v[l + 4]);
     (half[0] + half[2]) + (half[1] + half[3])
+}
+
+/// Rows of `n` values, times `scale`, as `n` slices of whole lanes, whose rest is to be zero before.
+#[multiversion(targets("x86_64+avx512f+fma", "x86_64+avx2+fma", "aarch64+neon"))]
+pub(crate) fn transpose(values: &[f64], n: usize, scale: f64, out: &mut [f32]) {
+    let lanes = out.len() / n;
+    for (at, rows) in values.chunks(LANES * n).enumerate() {
+        let slices = out.chunks_exact_mut(lanes).enumerate();
+        if rows.len() == LANES * n {
+            let rows: [&[f64]; LANES] = std::array::from_fn(|i| &rows[i * n..(i + 1) * n]);
+            for (k, out) in slices {
+                let column: [f64; LANES] = std::array::from_fn(|i| scale * rows[i][k]);
+                out[at * LANES..(at + 1) * LANES].copy_from_slice(&column.map(single));
+            }
+        } else {
+            for (k, out) in slices {
+                let column = rows.iter().skip(k).step_by(n);
+                out[at * LANES..].iter_mut().zip(column).for_each(|(out, v)| *out = single(scale * v));
+            }
+        }
+    }
 }
 
 /// `out[k]` = Σᵢ aₖᵢ uᵢ for the slices aₖ of `a`, which are as wide as `u`.
@@ -118,43 +142,40 @@ fn outer_tile<const R: usize, const G: usize>(
 /// `size`. Zeros at the ends of a row of the matrix are skipped.
 #[multiversion(targets("x86_64+avx512f+fma", "x86_64+avx2+fma", "aarch64+neon"))]
 pub(crate) fn apply(from: &[f32], matrix: &[f32], [size, width]: [usize; 2], to: &mut [f32]) {
-    for (to, row) in to.chunks_exact_mut(width).zip(matrix.chunks_exact(size)) {
-        let first = row.iter().position(|w| *w != 0.0).unwrap_or(0);
-        let end = row.iter().rposition(|w| *w != 0.0).map_or(0, |last| last + 1);
-        let mut at = 0;
-        while at < width {
-            let out = &mut to[at..];
-            match width - at {
-                left if left >= 4 * LANES => {
-                    combine::<4>(&row[first..end], &from[first * width + at..], width, out);
-                    at += 4 * LANES;
-                }
-                left if left >= LANES => {
-                    combine::<1>(&row[first..end], &from[first * width + at..], width, out);
-                    at += LANES;
-                }
-                _ => {
-                    out[0] = (first..end).fold(0.0, |sum, k| row[k].mul_add(from[k * width + at], sum));
-                    at += 1;
-                }
+    let mut at = 0;
+    // some lanes of all slices at a time, which stay in the first cache
+    while at < width {
+        let lanes = ((width - at) / LANES).min(4);
+        for (to, row) in to.chunks_exact_mut(width).zip(matrix.chunks_exact(size)) {
+            let first = row.iter().position(|w| *w != 0.0).unwrap_or(0);
+            let end = row.iter().rposition(|w| *w != 0.0).map_or(0, |last| last + 1);
+            let (row, from, to) = (&row[first..end], &from[first * width..], &mut to[at..]);
+            match lanes {
+                0 => to[0] = row.iter().zip(from.chunks(width)).fold(0.0, |sum, (w, from)| w.mul_add(from[at], sum)),
+                1 => combine::<1>(row, from, at, width, to),
+                2 => combine::<2>(row, from, at, width, to),
+                3 => combine::<3>(row, from, at, width, to),
+                _ => combine::<4>(row, from, at, width, to),
             }
         }
+        at += (lanes * LANES).max(1);
     }
 }
 
-/// Σ wₖ of the first `G` lanes of the slices of `from`.
+/// Σ wₖ of `G` lanes of the slices of `from`, from `at` on.
 #[inline(always)]
-fn combine<const G: usize>(weights: &[f32], from: &[f32], width: usize, out: &mut [f32]) {
+fn combine<const G: usize>(weights: &[f32], from: &[f32], at: usize, width: usize, out: &mut [f32]) {
     let mut sums = [[0.0; LANES]; G];
-    for (&w, from) in weights.iter().zip(from.chunks(width)) {
-        let Some(from) = from.get(..G * LANES) else { break };
-        for (sum, v) in sums.iter_mut().zip(from.as_chunks::<LANES>().0) {
-            *sum = add(*sum, w, *v);
+    if at + G * LANES > width {
+        return;
+    }
+    for (&w, from) in weights.iter().zip(from.chunks_exact(width)) {
+        let from: [Lane; G] = lanes(&from[at..at + G * LANES]);
+        for (sum, v) in sums.iter_mut().zip(from) {
+            *sum = add(*sum, w, v);
         }
     }
-    for (out, sum) in out.as_chunks_mut::<LANES>().0.iter_mut().zip(sums) {
-        *out = sum;
-    }
+    out[..G * LANES].copy_from_slice(sums.as_flattened());
 }
 
 /// (1 2 1)/4 of slices of `width`; nothing lies beyond the ends.
@@ -177,8 +198,8 @@ pub(crate) fn affine(inputs: &[f32], weights: &[f32], bias: &[f32], least: f32, 
         let (inputs, out) = (&inputs[first * count..], &mut out[first * outputs..]);
         first += match taxels - first {
             1 => affine_taxels::<1>(inputs, weights, bias, least, out),
-            2 | 3 => affine_taxels::<2>(inputs, weights, bias, least, out),
-            _ => affine_taxels::<ROWS>(inputs, weights, bias, least, out),
+            2 => affine_taxels::<2>(inputs, weights, bias, least, out),
+            _ => affine_taxels::<3>(inputs, weights, bias, least, out),
         };
     }
 }
@@ -186,45 +207,46 @@ pub(crate) fn affine(inputs: &[f32], weights: &[f32], bias: &[f32], least: f32, 
 /// All outputs of the first `T` taxels; returns `T`.
 #[inline(always)]
 fn affine_taxels<const T: usize>(inputs: &[f32], weights: &[f32], bias: &[f32], least: f32, out: &mut [f32]) -> usize {
-    let (outputs, count) = (bias.len(), weights.len() / bias.len());
     let mut at = 0;
-    while at < outputs {
-        let (weights, bias, out) = (&weights[at..], &bias[at..], &mut out[at..]);
-        at += match (outputs - at) / LANES {
-            1 => affine_tile::<T, 1>(inputs, weights, bias, [count, outputs], least, out),
-            2 => affine_tile::<T, 2>(inputs, weights, bias, [count, outputs], least, out),
-            _ => affine_tile::<T, 3>(inputs, weights, bias, [count, outputs], least, out),
+    while at < bias.len() {
+        at += match (bias.len() - at) / LANES {
+            1 => affine_tile::<T, 1>(inputs, weights, bias, at, least, out),
+            2 => affine_tile::<T, 2>(inputs, weights, bias, at, least, out),
+            _ => affine_tile::<T, 3>(inputs, weights, bias, at, least, out),
         };
     }
     T
 }
 
-/// The first `G` lanes of outputs of `T` taxels; returns how many outputs they are.
+/// `G` lanes of outputs from `at` on, of `T` taxels; returns how many outputs they are.
 #[inline(always)]
 fn affine_tile<const T: usize, const G: usize>(
     inputs: &[f32],
     weights: &[f32],
     bias: &[f32],
-    [count, outputs]: [usize; 2],
+    at: usize,
     least: f32,
     out: &mut [f32],
 ) -> usize {
-    let mut sums: [[Lane; G]; T] = [lanes(bias); T];
-    for (k, w) in (0..count).zip(weights.chunks(outputs)) {
-        let Some(w) = w.get(..G * LANES) else { break };
-        let w = w.as_chunks::<LANES>().0;
-        for (t, sums) in sums.iter_mut().enumerate() {
-            let value = inputs[t * count + k];
+    let (outputs, end) = (bias.len(), at + G * LANES);
+    let count = weights.len() / outputs;
+    let mut rows: [&[f32]; T] = [&[]; T];
+    rows.iter_mut().zip(inputs.chunks_exact(count)).for_each(|(row, inputs)| *row = inputs);
+    // said here, so that the loop has no checks
+    if end > outputs || rows.iter().any(|row| row.len() != count) {
+        return G * LANES;
+    }
+    let mut sums: [[Lane; G]; T] = [lanes(&bias[at..end]); T];
+    for (k, w) in (0..count).zip(weights.chunks_exact(outputs)) {
+        let w: [Lane; G] = lanes(&w[at..end]);
+        for (sums, row) in sums.iter_mut().zip(rows) {
             for (sum, w) in sums.iter_mut().zip(w) {
-                *sum = add(*sum, value, *w);
+                *sum = add(*sum, row[k], w);
             }
         }
     }
-    for (t, sums) in sums.iter().enumerate() {
-        for (g, sum) in sums.iter().enumerate() {
-            let out = &mut out[t * outputs + g * LANES..][..LANES];
-            out.iter_mut().zip(sum).for_each(|(out, sum)| *out = sum.max(least));
-        }
+    for (out, sums) in out.chunks_exact_mut(outputs).zip(&sums) {
+        out[at..end].iter_mut().zip(sums.as_flattened()).for_each(|(out, sum)| *out = sum.max(least));
     }
     G * LANES
 }
@@ -277,48 +299,65 @@ fn around_tile<const T: usize>(
     T
 }
 
-/// For `line`, which has `width` numbers for each sample, and for the places k from 0 to `cols` − side: |s|² over the
-/// samples, s being the numbers at k + side less those at k. `sides` ascend, and `found` has whole lanes of `cols`
-/// places for each. A line has a lane more than `cols` numbers.
+/// For the lines `below` less `above`, which have `width` numbers for each sample, for all `sides` and for the places k
+/// from 0 to `cols` − side: |s|² over the samples, s being the numbers at k + side less those at k. Sides ascend and are
+/// shorter than [`LONG`], the first eight shorter than [`SHORT`]. `found` has whole lanes of `cols` places for each.
+/// `line` becomes the difference, and has [`LONG`] numbers more.
 #[multiversion(targets("x86_64+avx512f+fma", "x86_64+avx2+fma", "aarch64+neon"))]
-pub(crate) fn span_squares(line: &[f32], width: usize, cols: usize, sides: &[Side], found: &mut [f32]) {
+pub(crate) fn span_squares(
+    [above, below]: [&[f32]; 2],
+    line: &mut [f32],
+    width: usize,
+    cols: usize,
+    sides: &[Side],
+    found: &mut [f32],
+) {
+    line.iter_mut().zip(below.iter().zip(above)).for_each(|(v, (below, above))| *v = below - above);
     let places = cols.next_multiple_of(LANES);
     for at in (0..cols).step_by(LANES) {
-        let mut first = 0;
-        let fitting = sides.partition_point(|side| at + side.length <= cols);
-        while first < fitting {
-            let (sides, found) = (&sides[first..fitting], &mut found[first * places..]);
-            first += match sides.len() {
-                1 => squares::<1>(line, [width, places, at], sides, found),
-                2 => squares::<2>(line, [width, places, at], sides, found),
-                3 | 4 => squares::<4>(line, [width, places, at], sides, found),
-                _ => squares::<8>(line, [width, places, at], sides, found),
-            };
+        let fitting = &sides[..sides.partition_point(|side| at + side.length <= cols)];
+        let (short, long) = fitting.split_at(fitting.len().min(8));
+        let (line, end) = (&line[at..], above.len() - at);
+        let (found, found_long) = found[at..].split_at_mut(places * short.len());
+        match short.len() {
+            0 => {}
+            1 | 2 => squares::<2, SHORT>(line, [width, end], short, places, found),
+            3 | 4 => squares::<4, SHORT>(line, [width, end], short, places, found),
+            _ => squares::<8, SHORT>(line, [width, end], short, places, found),
+        }
+        match long.len() {
+            0 => {}
+            1 | 2 => squares::<2, LONG>(line, [width, end], long, places, found_long),
+            _ => squares::<6, LONG>(line, [width, end], long, places, found_long),
         }
     }
 }
 
-/// A lane of places for the first `G` sides, or for all if they are fewer; returns `G`.
+/// A lane of places for `sides`, at most `G` and shorter than `LIMIT`, a power of two.
 #[inline(always)]
-fn squares<const G: usize>(line: &[f32], [width, places, at]: [usize; 3], sides: &[Side], found: &mut [f32]) -> usize {
-    let ends: [usize; G] = std::array::from_fn(|g| at + sides[g.min(sides.len() - 1)].length);
+fn squares<const G: usize, const LIMIT: usize>(
+    line: &[f32],
+    [width, end]: [usize; 2],
+    sides: &[Side],
+    places: usize,
+    found: &mut [f32],
+) {
+    let mut lengths = [0; G];
+    lengths.iter_mut().zip(sides).for_each(|(length, side)| *length = side.length);
     let mut sums = [[0.0; LANES]; G];
-    // said here, so that the loop has no checks
-    if at + LANES > width || ends.iter().any(|end| end + LANES > width) {
-        return G;
-    }
-    for line in line.chunks_exact(width) {
-        let from = lane(line, at);
-        for (sum, end) in sums.iter_mut().zip(ends) {
-            let to = lane(line, end);
+    for start in (0..end).step_by(width) {
+        let Some(line) = line.get(start..start + LIMIT + LANES) else { break };
+        let from = lane(line, 0);
+        for (sum, length) in sums.iter_mut().zip(lengths) {
+            // said here, so that there is no check
+            let to = lane(line, length % LIMIT);
             let s: Lane = std::array::from_fn(|l| to[l] - from[l]);
             *sum = std::array::from_fn(|l| s[l].mul_add(s[l], sum[l]));
         }
     }
-    for (found, sum) in found.chunks_exact_mut(places).zip(sums).take(sides.len()) {
-        found[at..][..LANES].copy_from_slice(&sum);
+    for ((found, sum), _) in found.chunks_mut(places).zip(sums).zip(sides) {
+        found[..LANES].copy_from_slice(&sum);
     }
-    G
 }
 
 /// Length of spans, taxels, and how far they lie apart.

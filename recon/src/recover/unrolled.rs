@@ -5,10 +5,12 @@ use crate::checks::{other_columns, overflow};
 use crate::cholesky::{factor, solve_lower, solve_upper};
 use crate::kernels::{dot, norm};
 use crate::kernels32::{
-    LANES, Side, add_weighted, affine, apply, around, blur, explain, outer_sums, products, single, span_squares, weigh,
+    LANES, LONG, Side, add_weighted, affine, apply, around, blur, explain, outer_sums, products, single, span_squares,
+    transpose, weigh,
 };
+use crate::matrix::MatrixView;
 use crate::metrics::SUPPORT_THRESHOLD;
-use crate::problem::{Problem, Recover, Solution, Workspace, divide_into, operator_scale, power_of_two};
+use crate::problem::{ORDINARY, Problem, Recover, Solution, Workspace, divide_into, operator_scale, power_of_two};
 use nalgebra::DMatrix;
 use spts_input::Refusal;
 use std::sync::Arc;
@@ -329,7 +331,7 @@ fn factored(covariance: &[f64], size: usize) -> Vec<f32> {
 /// value a sample, and zeros up to whole lanes.
 #[derive(Debug, Default)]
 struct Scratch {
-    /// Φ, M × N, and as N × samples; and blurred.
+    /// Φ, M × N, if it has to be scaled; as N × samples, and blurred.
     rows: Vec<f64>,
     phi: Vec<f32>,
     wider: Vec<f32>,
@@ -440,7 +442,7 @@ impl Unrolled {
         if a.ncols() != n {
             return Err(other_columns(a.ncols(), n));
         }
-        let size = work.scale_rows(operator_scale(a)?, problem);
+        let size = work.scale_rows(a, self.grid.cols)?;
         let y_scale = power_of_two(problem.y());
         divide_into(problem.y(), y_scale, &mut work.y);
         work.image.clear();
@@ -569,21 +571,7 @@ impl Unrolled {
     /// The maps of the rectangles, on a grid with one more column; returned are Σ p e and Σ p ln A.
     fn rectangles(&self, work: &mut Scratch) -> [f64; 2] {
         let grid = &*self.grid;
-        let (m, n, wide) = (work.y.len(), grid.taxels(), grid.cols + 1);
-        // sums over the taxels above and left, of every sample, with room to read on
-        let width = (wide + LANES).next_multiple_of(LANES);
-        let integral = zeros(&mut work.integral, (grid.rows + 1) * m * width);
-        for (i, row) in work.rows.chunks_exact(n).enumerate() {
-            for (r, values) in row.chunks_exact(grid.cols).enumerate() {
-                let (above, own) = integral.split_at_mut((r + 1) * m * width);
-                let (above, own) = (&above[(r * m + i) * width + 1..], &mut own[i * width + 1..]);
-                let mut sum = 0.0;
-                for ((own, above), v) in own.iter_mut().zip(above).zip(values) {
-                    sum += single(*v);
-                    *own = above + sum;
-                }
-            }
-        }
+        let (m, n, wide, width) = (work.y.len(), grid.taxels(), grid.cols + 1, line_width(grid.cols));
         singles(work.y.iter().copied(), m.next_multiple_of(LANES), &mut work.u32);
         let back = sized(&mut work.back_wide, n);
         products(&work.phi, &work.u32, back);
@@ -600,7 +588,7 @@ impl Unrolled {
         let [down, along] = &grid.spans;
         let count = along.len().next_multiple_of(LANES);
         let rectangles = sized(&mut work.rectangles, down.len() * 3 * count);
-        let between = sized(&mut work.line, m * width);
+        let between = sized(&mut work.line, m * width + LONG);
         let found = sized(&mut work.found, grid.sides.len() * grid.cols.next_multiple_of(LANES));
         let c = UNEVEN + single(self.weights.noise_variance);
         let scale = single(1.0 / dot(&work.y, &work.y));
@@ -608,8 +596,7 @@ impl Unrolled {
         let own = rectangles.chunks_exact_mut(3 * count).zip(grid.shares.chunks_exact(count));
         for ([top, bottom], (own, shares)) in down.iter().zip(own) {
             let [above, below] = [top, bottom].map(|row| &work.integral[row * m * width..][..m * width]);
-            between.iter_mut().zip(below.iter().zip(above)).for_each(|(v, (below, above))| *v = below - above);
-            span_squares(between, width, grid.cols, &grid.sides, found);
+            span_squares([above, below], between, width, grid.cols, &grid.sides, found);
             let [above, below] = [top, bottom].map(|row| &work.integral_y[row * wide..][..wide]);
             work.line_y.clear();
             work.line_y.extend(below.iter().zip(above).map(|(below, above)| below - above));
@@ -783,7 +770,7 @@ impl Unrolled {
         solve_upper(&work.lower, m, &mut work.u);
         singles(work.u.iter().copied(), lanes, &mut work.u32);
         products(&work.phi, &work.u32, sized(&mut work.back, n));
-        products(&work.wider, &work.u32, sized(&mut work.back_wide, n));
+        blurred(&work.back, grid, 1, &mut work.passed, &mut work.back_wide);
         work.back_wide.iter_mut().zip(&work.together).for_each(|(v, q)| *v *= q * q);
         blurred(&work.back_wide, grid, 1, &mut work.passed, &mut work.smooth);
         let length = single(0.3 / (norm(&work.u).powi(2) + 1e-20).sqrt());
@@ -803,7 +790,13 @@ fn smooth(values: &[f32], grid: &Grid, near: &[Vec<f32>; 2], lanes: usize, passe
     let (passed, out) = (sized(passed, values.len()), sized(out, values.len()));
     apply(values, &near[0], [grid.rows, line], passed);
     for (from, to) in passed.chunks_exact(line).zip(out.chunks_exact_mut(line)) {
-        apply(from, &near[1], [grid.cols, lanes], to);
+        if lanes == 1 {
+            // the Gaussian is symmetric
+            to.fill(0.0);
+            add_weighted(&near[1], from, to);
+        } else {
+            apply(from, &near[1], [grid.cols, lanes], to);
+        }
     }
 }
 
@@ -818,24 +811,45 @@ fn blurred(values: &[f32], grid: &Grid, lanes: usize, passed: &mut Vec<f32>, out
 }
 
 impl Scratch {
-    /// The rows, scaled to a root mean square of 1, as rows and as N × samples; returns what they were divided by, 0
-    /// for rows that are all zero.
-    fn scale_rows(&mut self, power: f64, problem: &Problem<'_>) -> f64 {
-        let (a, n) = (problem.matrix(), problem.matrix().ncols());
-        divide_into(a.values(), power, &mut self.rows);
-        let rms = norm(&self.rows) / (self.rows.len() as f64).sqrt();
+    /// The rows, scaled to a root mean square of 1, as N × samples and as sums over the taxels above and left; returns
+    /// what they were divided by, 0 for rows that are all zero.
+    ///
+    /// # Errors
+    /// [`Refusal`] for a NaN or an infinity.
+    fn scale_rows(&mut self, a: MatrixView<'_>, cols: usize) -> Result<f64, Refusal> {
+        let (m, n, mut values, mut power) = (a.nrows(), a.ncols(), a.values(), 1.0);
+        let mut square = dot(values, values);
+        if !ORDINARY.contains(&square) {
+            power = operator_scale(a)?;
+            divide_into(values, power, &mut self.rows);
+            values = &self.rows;
+            square = dot(values, values);
+        }
+        let rms = (square / values.len() as f64).sqrt();
         let scale = if rms > 0.0 { 1.0 / rms } else { 0.0 };
-        let lanes = a.nrows().next_multiple_of(LANES);
-        self.phi.clear();
-        self.phi.resize(n * lanes, 0.0);
-        self.rows.iter_mut().for_each(|v| *v *= scale);
-        for (i, row) in self.rows.chunks_exact(n.max(1)).enumerate() {
-            for (k, v) in row.iter().enumerate() {
-                self.phi[k * lanes + i] = single(*v);
+        transpose(values, n, scale, zeros(&mut self.phi, n * m.next_multiple_of(LANES)));
+        let width = line_width(cols);
+        let integral = sized(&mut self.integral, (n / cols + 1) * m * width);
+        integral[..m * width].fill(0.0);
+        for (i, row) in values.chunks_exact(n).enumerate() {
+            for (r, values) in row.chunks_exact(cols).enumerate() {
+                let (above, own) = integral.split_at_mut((r + 1) * m * width);
+                let (above, own) = (&above[(r * m + i) * width..][..cols + 1], &mut own[i * width..][..cols + 1]);
+                let mut sum = 0.0;
+                own[0] = 0.0;
+                for ((own, above), v) in own[1..].iter_mut().zip(&above[1..]).zip(values) {
+                    sum += single(scale * v);
+                    *own = above + sum;
+                }
             }
         }
-        power * rms
+        Ok(power * rms)
     }
+}
+
+/// Numbers in a row of sums over `cols` taxels: one more, and a lane to read on.
+fn line_width(cols: usize) -> usize {
+    (cols + 1 + LANES).next_multiple_of(LANES)
 }
 
 /// `values` in single precision, with zeros up to `lanes`.
@@ -930,7 +944,7 @@ pub(super) fn agree(image: &mut [f64], order: &[usize], count: usize) {
 mod tests {
     use super::*;
     use crate::checks::says;
-    use crate::matrix::{Matrix, MatrixView};
+    use crate::matrix::Matrix;
     use crate::metrics::support;
     use nalgebra::{DMatrix, DVector};
     use rand::{RngExt as _, SeedableRng as _};
