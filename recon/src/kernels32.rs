@@ -387,10 +387,9 @@ pub(crate) fn explain(
     for (found, &Side { length, step }) in found.chunks_exact(cols.next_multiple_of(LANES)).zip(sides) {
         let count = (cols - length) / step + 1;
         let own = spread[first..].iter_mut().zip(&mut height[first..]);
-        let values = found.iter().zip(along[length..].iter().zip(along));
-        let set = |((square, product), (s, (to, from))): ((&mut f32, &mut f32), (&f32, (&f64, &f64)))| {
-            (*square, *product) = (*s, single(to - from));
-        };
+        let products = along[length..].iter().zip(along).map(|(to, from)| single(to - from));
+        let values = found.iter().copied().zip(products);
+        let set = |((square, product), found): ((&mut f32, &mut f32), (f32, f32))| (*square, *product) = found;
         match step {
             1 => own.zip(values).for_each(set),
             _ => own.zip(values.step_by(step)).for_each(set),
