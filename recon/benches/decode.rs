@@ -7,7 +7,9 @@ use nalgebra::{DMatrix, DVector};
 use rand::{RngExt as _, SeedableRng as _};
 use rand_chacha::ChaCha8Rng;
 use spts_recon::classify::{Library, Src};
-use spts_recon::recover::{Fixed, ImagePrior, Lmmse, NnLmmse, Noise, RECOVER};
+use spts_recon::recover::{
+    Fixed, ImagePrior, Lmmse, NnLmmse, Noise, RECOVER, Unrolled, UnrolledBlock, UnrolledWeights,
+};
 use spts_recon::{Matrix, Problem, Recover, Solution, Workspace};
 use std::hint::black_box;
 use std::sync::Arc;
@@ -113,11 +115,69 @@ fn fixed(c: &mut Criterion) {
     group.finish();
 }
 
+/// The network with the sizes of the trained one, its numbers drawn, beside the linear estimate: ±1 measurements of one
+/// to three contacts with 5 % of noise. Every window has other rows than the one before.
+fn unrolled(c: &mut Criterion) {
+    let mut group = c.benchmark_group("unrolled");
+    for (cols, m) in [(10, 7), (10, 20), (10, 50), (32, 100)] {
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        let images = Matrix::from(&DMatrix::from_columns(&(0..200).map(|k| touch(k, cols)).collect::<Vec<_>>()));
+        let prior = Arc::new(ImagePrior::UNSEEN.learn(&images, cols).expect("images"));
+        let windows: Vec<(Matrix, Vec<f64>)> = (0..16)
+            .map(|k| {
+                let phi = DMatrix::from_fn(m, cols * cols, |_, _| if rng.random() { 1.0 } else { -1.0 });
+                let contacts = (0..1 + k % 3).map(|contact| touch(3 * k + contact, cols));
+                let y = (&phi * contacts.sum::<DVector<f64>>()).map(|y| y * (1.0 + rng.random_range(-0.05..0.05)));
+                (Matrix::from(&phi), y.as_slice().to_vec())
+            })
+            .collect();
+        let methods: [(&str, Box<dyn Recover>); 2] = [
+            ("network", Box::new(Unrolled::new(drawn_weights(&mut rng), [cols, cols]).expect("in range"))),
+            ("linear", Box::new(Lmmse::new(prior, Noise::Relative(0.12)).expect("in range"))),
+        ];
+        let mut work = (Workspace::default(), Solution::default());
+        for (name, method) in &methods {
+            let mut next = windows.iter().cycle();
+            group.bench_function(BenchmarkId::new(*name, format!("{cols} × {cols}, M = {m}")), |b| {
+                b.iter(|| {
+                    let Some((phi, y)) = next.next() else { return };
+                    let problem = Problem::new(phi.view(), black_box(y));
+                    let _ = black_box(problem.and_then(|p| method.recover_into(&p, &mut work.0, &mut work.1)));
+                });
+            });
+        }
+    }
+    group.finish();
+}
+
+/// Four blocks of 24 channels and 13 values of memory, and four kinds of contacts. The numbers are as large as those of
+/// layers at the start of a training, so that about half of what is cut off at zero remains.
+fn drawn_weights(rng: &mut ChaCha8Rng) -> UnrolledWeights {
+    let (channels, outputs, taxel, whole) = (24, 16, 25, 27);
+    let mut draw = |inputs: usize, count: usize| -> Vec<f32> {
+        (0..inputs * count).map(|_| rng.random_range(-1.0..1.0) / (inputs as f32).sqrt()).collect()
+    };
+    let block = |_| UnrolledBlock {
+        taxel: draw(taxel, channels),
+        whole: draw(whole, channels),
+        bias: draw(1, channels),
+        near: draw(9, channels),
+        near_bias: draw(1, channels),
+        output: draw(channels, outputs),
+        output_bias: draw(1, outputs),
+        noise: draw(whole + 1, 1),
+    };
+    let kinds =
+        vec![[0.05, 0.05, 0.02, 0.88], [0.42, 0.09, 0.01, 0.48], [0.47, 0.19, 0.02, 0.32], [0.22, 0.45, 0.13, 0.2]];
+    UnrolledWeights::new([1.2, 4.5], kinds, 0.012, (0..4).map(block).collect()).expect("sizes that fit")
+}
+
 /// A disc or a bar somewhere on the sheet.
 fn touch(seed: u64, cols: usize) -> DVector<f64> {
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let (r, c) = (rng.random_range(2.0..7.0), rng.random_range(2.0..7.0));
-    let (size, turn) = (rng.random_range(1.5..3.5), rng.random_range(0.0..3.1));
+    let scale = cols as f64 / 10.0;
+    let (r, c) = (scale * rng.random_range(2.0..7.0), scale * rng.random_range(2.0..7.0));
+    let (size, turn) = (scale * rng.random_range(1.5..3.5), rng.random_range(0.0..3.1));
     let long = if rng.random() { 1.0 } else { 3.0 };
     DVector::from_fn(cols * cols, |k, _| {
         let (y, x) = ((k / cols) as f64 - r, (k % cols) as f64 - c);
@@ -127,5 +187,5 @@ fn touch(seed: u64, cols: usize) -> DVector<f64> {
     })
 }
 
-criterion_group!(benches, decode, classify, fixed);
+criterion_group!(benches, decode, classify, fixed, unrolled);
 criterion_main!(benches);

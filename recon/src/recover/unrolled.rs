@@ -5,10 +5,12 @@ use crate::checks::{other_columns, overflow};
 use crate::cholesky::{factor, solve_lower, solve_upper};
 use crate::kernels::{dot, norm};
 use crate::kernels32::{
-    LANES, add_weighted, affine, apply, around, blur, explain, likelihoods, outer_sums, products, single, span_products,
+    LANES, LONG, Side, add_weighted, affine, apply, around, blur, explain, outer_sums, products, single, span_squares,
+    transpose, weigh,
 };
+use crate::matrix::MatrixView;
 use crate::metrics::SUPPORT_THRESHOLD;
-use crate::problem::{Problem, Recover, Solution, Workspace, divide_into, operator_scale, power_of_two};
+use crate::problem::{ORDINARY, Problem, Recover, Solution, Workspace, divide_into, operator_scale, power_of_two};
 use nalgebra::DMatrix;
 use spts_input::Refusal;
 use std::sync::Arc;
@@ -84,12 +86,13 @@ struct Grid {
     /// F of the wide one, Fᵀ F being the Gaussian, along both; and the rows of F.
     factors: [Vec<f32>; 2],
     factor_rows: [usize; 2],
-    /// .75/A of every rectangle.
-    shares: Vec<f32>,
-    /// Logarithms of 0, 1, 2, …
-    logs: Vec<f64>,
-    /// Spans of taxels along the rows and along the columns that sides of rectangles have.
+    /// Sides of rectangles along a row, and the spans of taxels along a column and along a row that they may have.
+    sides: Vec<Side>,
     spans: [Vec<[usize; 2]>; 2],
+    /// .75/A of every rectangle; those of the same rows are together, with zeros up to whole lanes.
+    shares: Vec<f32>,
+    /// Logarithms of the lengths of both spans, those along a row with zeros up to whole lanes.
+    logs: [Vec<f32>; 2],
     /// Maps of where a taxel lies.
     places: Vec<[f32; PLACES]>,
 }
@@ -286,15 +289,22 @@ impl Grid {
         let factors = [factored(&wide[0], rows), factored(&wide[1], cols)];
         let factor_rows = [factors[0].len() / rows, factors[1].len() / cols];
         let near = near.map(|axes| axes.map(|values| values.into_iter().map(single).collect()));
-        let logs = (0..=rows.max(cols)).map(|side| libm::log(side as f64)).collect();
         let spans = [rows, cols].map(|size| {
-            let fitting = SIDES.iter().filter(|side| **side <= size);
-            fitting.flat_map(|side| (0..=size - side).step_by(step(*side)).map(move |at| [at, at + side])).collect()
+            let sides = sides(size);
+            let of_side =
+                |&Side { length, step }: &Side| (0..=size - length).step_by(step).map(move |at| [at, at + length]);
+            sides.iter().flat_map(of_side).collect::<Vec<[usize; 2]>>()
         });
-        let length = |span: &[usize; 2]| (span[1] - span[0]) as f32;
-        let [down, along]: &[Vec<[usize; 2]>; 2] = &spans;
-        let shares = down.iter().flat_map(|d| along.iter().map(move |a| EVEN / (length(d) * length(a)))).collect();
-        Self { rows, cols, near, factors, factor_rows, shares, logs, spans, places }
+        let lengths = spans.each_ref().map(|spans| spans.iter().map(|[first, end]| end - first));
+        let [down, along] = lengths.clone();
+        let whole = along.len().next_multiple_of(LANES);
+        let share = |d: usize, a: usize| EVEN / (d as f32 * a as f32);
+        let line = |d: usize| along.clone().map(move |a| share(d, a)).chain(std::iter::repeat(0.0)).take(whole);
+        let shares = down.flat_map(line).collect();
+        let mut logs =
+            lengths.map(|lengths| lengths.map(|length| single(libm::log(length as f64))).collect::<Vec<f32>>());
+        logs[1].resize(whole, 0.0);
+        Self { rows, cols, near, factors, factor_rows, sides: sides(cols), spans, shares, logs, places }
     }
 
     fn taxels(&self) -> usize {
@@ -302,9 +312,10 @@ impl Grid {
     }
 }
 
-/// Taxels from a rectangle to the next along a side.
-fn step(side: usize) -> usize {
-    (side / 4).max(1)
+/// Sides of rectangles that fit into `size` taxels.
+fn sides(size: usize) -> Vec<Side> {
+    let fitting = SIDES.into_iter().filter(|length| *length <= size);
+    fitting.map(|length| Side { length, step: (length / 4).max(1) }).collect()
 }
 
 /// F with Fᵀ F = `covariance` (`size` × `size`, positive semidefinite), but for eigenvalues below [`LEAST`] of the
@@ -320,7 +331,7 @@ fn factored(covariance: &[f64], size: usize) -> Vec<f32> {
 /// value a sample, and zeros up to whole lanes.
 #[derive(Debug, Default)]
 struct Scratch {
-    /// Φ, M × N, and as N × samples; and blurred.
+    /// Φ, M × N, if it has to be scaled; as N × samples, and blurred.
     rows: Vec<f64>,
     phi: Vec<f32>,
     wider: Vec<f32>,
@@ -348,16 +359,16 @@ struct Scratch {
     /// Sums of Φ over the taxels above and left, and between two rows; samples in single precision.
     integral: Vec<f32>,
     line: Vec<f32>,
-    found: [Vec<f32>; 2],
-    y32: Vec<f32>,
-    /// Of every rectangle: c + .75 |s|²/A, the height, e and p.
-    spread: Vec<f32>,
-    height: Vec<f32>,
-    explained: Vec<f32>,
-    weight: Vec<f32>,
-    /// Both maps of the rectangles, first as changes at their corners.
+    found: Vec<f32>,
+    /// The same sums of Φᵀy, and those between two rows.
+    integral_y: Vec<f64>,
+    line_y: Vec<f64>,
+    /// Of the rectangles between two rows: c + .75 |s|²/A, then the heights, then e.
+    rectangles: Vec<f32>,
+    /// What both maps of the rectangles change by at each row, for every span along the row; and the maps, first as
+    /// changes at the corners of rectangles.
+    changes: [Vec<f32>; 2],
     maps: [Vec<f64>; 2],
-    lines: [Vec<f64>; 2],
     mean: Vec<f32>,
     /// q₁ less its floor, and q₂.
     alone: Vec<f32>,
@@ -365,7 +376,6 @@ struct Scratch {
     /// x, d, .3 g, l, m, q₁, q₂, rectangles, where and h of every taxel, and the values of the whole image.
     inputs: Vec<f32>,
     whole: Vec<f32>,
-    hidden: Vec<f32>,
     bordered: Vec<f32>,
     mixed: Vec<f32>,
     out: Vec<f32>,
@@ -432,7 +442,7 @@ impl Unrolled {
         if a.ncols() != n {
             return Err(other_columns(a.ncols(), n));
         }
-        let size = work.scale_rows(operator_scale(a)?, problem);
+        let size = work.scale_rows(a, self.grid.cols)?;
         let y_scale = power_of_two(problem.y());
         divide_into(problem.y(), y_scale, &mut work.y);
         work.image.clear();
@@ -561,75 +571,58 @@ impl Unrolled {
     /// The maps of the rectangles, on a grid with one more column; returned are Σ p e and Σ p ln A.
     fn rectangles(&self, work: &mut Scratch) -> [f64; 2] {
         let grid = &*self.grid;
-        let (m, n, wide) = (work.y.len(), grid.taxels(), grid.cols + 1);
-        // sums over the taxels above and left, of every sample, with room to read on
-        let width = (wide + LANES).next_multiple_of(LANES);
-        let integral = zeros(&mut work.integral, (grid.rows + 1) * m * width);
-        for (i, row) in work.rows.chunks_exact(n).enumerate() {
-            for (r, values) in row.chunks_exact(grid.cols).enumerate() {
-                let (above, own) = integral.split_at_mut((r + 1) * m * width);
-                let (above, own) = (&above[(r * m + i) * width + 1..], &mut own[i * width + 1..]);
-                let mut sum = 0.0;
-                for ((own, above), v) in own.iter_mut().zip(above).zip(values) {
-                    sum += single(*v);
-                    *own = above + sum;
-                }
+        let (m, n, wide, width) = (work.y.len(), grid.taxels(), grid.cols + 1, line_width(grid.cols));
+        singles(work.y.iter().copied(), m.next_multiple_of(LANES), &mut work.u32);
+        let back = sized(&mut work.back_wide, n);
+        products(&work.phi, &work.u32, back);
+        work.integral_y.clear();
+        work.integral_y.resize(wide, 0.0);
+        for row in back.chunks_exact(grid.cols) {
+            let mut sum = 0.0;
+            work.integral_y.push(0.0);
+            for v in row {
+                sum += f64::from(*v);
+                work.integral_y.push(work.integral_y[work.integral_y.len() - wide] + sum);
             }
         }
         let [down, along] = &grid.spans;
-        let count = down.len() * along.len();
-        for list in [&mut work.spread, &mut work.height, &mut work.explained, &mut work.weight] {
-            sized(list, count);
-        }
-        singles(work.y.iter().copied(), m, &mut work.y32);
-        let between = sized(&mut work.line, m * width);
-        let [squares, products] = work.found.each_mut().map(|list| sized(list, grid.cols));
-        let own = work.spread.chunks_exact_mut(along.len()).zip(work.height.chunks_exact_mut(along.len()));
-        for ([top, bottom], (all_squares, all_products)) in down.iter().zip(own) {
-            let [top, bottom] = [top, bottom].map(|row| &work.integral[row * m * width..][..m * width]);
-            between.iter_mut().zip(bottom.iter().zip(top)).for_each(|(v, (bottom, top))| *v = bottom - top);
-            let mut at = 0;
-            for side in SIDES.into_iter().filter(|side| *side <= grid.cols) {
-                let places = grid.cols - side + 1;
-                span_products(between, width, side, &work.y32, &mut squares[..places], &mut products[..places]);
-                for place in (0..places).step_by(step(side)) {
-                    (all_squares[at], all_products[at]) = (squares[place], products[place]);
-                    at += 1;
-                }
-            }
-        }
+        let count = along.len().next_multiple_of(LANES);
+        let rectangles = sized(&mut work.rectangles, down.len() * 3 * count);
+        let between = sized(&mut work.line, m * width + LONG);
+        let found = sized(&mut work.found, grid.sides.len() * grid.cols.next_multiple_of(LANES));
         let c = UNEVEN + single(self.weights.noise_variance);
         let scale = single(1.0 / dot(&work.y, &work.y));
-        let (spread, height) = (&mut work.spread, &mut work.height);
-        let most = explain(spread, height, &mut work.explained, &grid.shares, [c, scale]);
-        likelihoods(&work.explained, &work.spread, most, m, &mut work.weight);
-        for map in &mut work.maps {
+        let mut most = 0.0_f32;
+        let own = rectangles.chunks_exact_mut(3 * count).zip(grid.shares.chunks_exact(count));
+        for ([top, bottom], (own, shares)) in down.iter().zip(own) {
+            let [above, below] = [top, bottom].map(|row| &work.integral[row * m * width..][..m * width]);
+            span_squares([above, below], between, width, grid.cols, &grid.sides, found);
+            let [above, below] = [top, bottom].map(|row| &work.integral_y[row * wide..][..wide]);
+            work.line_y.clear();
+            work.line_y.extend(below.iter().zip(above).map(|(below, above)| below - above));
+            most = most.max(explain(found, &work.line_y, &grid.sides, shares, [c, scale], own));
+        }
+        let [changes, heights] = work.changes.each_mut().map(|list| zeros(list, (grid.rows + 1) * count));
+        let (mut total, mut explained, mut extent) = (0.0, 0.0, 0.0);
+        let [log_down, log_along] = &grid.logs;
+        for (([top, bottom], log), own) in down.iter().zip(log_down).zip(work.rectangles.chunks_exact(3 * count)) {
+            let [of_changes, of_heights] = [&mut *changes, heights].map(|list| list.split_at_mut(bottom * count));
+            let at = top * count..(top + 1) * count;
+            let tops = [&mut of_changes.0[at.clone()], &mut of_heights.0[at]];
+            let bottoms = [&mut of_changes.1[..count], &mut of_heights.1[..count]];
+            let [p, e, ln] = weigh(own, log_along, [most, LEAST_WEIGHT], m, tops, bottoms).map(f64::from);
+            total += p;
+            explained += e;
+            extent += ln + p * f64::from(*log);
+        }
+        for (map, changes) in work.maps.iter_mut().zip(&work.changes) {
             map.clear();
             map.resize((grid.rows + 1) * wide, 0.0);
-        }
-        let (mut total, mut explained, mut extent) = (0.0, 0.0, 0.0);
-        let of_lines = work.weight.chunks_exact(along.len()).zip(work.height.chunks_exact(along.len()));
-        let of_lines = of_lines.zip(work.explained.chunks_exact(along.len())).zip(down);
-        for (((weights, heights), e), [top, bottom]) in of_lines {
-            let lines = &mut work.lines;
-            lines.iter_mut().for_each(|line| line.clear());
-            lines.iter_mut().for_each(|line| line.resize(grid.cols + 1, 0.0));
-            for (((weight, height), e), [left, right]) in weights.iter().zip(heights).zip(e).zip(along) {
-                if *weight < LEAST_WEIGHT {
-                    continue;
+            for (map, changes) in map.chunks_exact_mut(wide).zip(changes.chunks_exact(count)) {
+                for ([left, right], change) in along.iter().zip(changes) {
+                    map[*left] += f64::from(*change);
+                    map[*right] -= f64::from(*change);
                 }
-                let p = f64::from(*weight);
-                total += p;
-                explained += p * f64::from(*e);
-                extent += p * (grid.logs[bottom - top] + grid.logs[right - left]);
-                for (line, value) in lines.iter_mut().zip([p, p * f64::from(*height)]) {
-                    line[*left] += value;
-                    line[*right] -= value;
-                }
-            }
-            for (map, line) in work.maps.iter_mut().zip(&*lines) {
-                map[top * wide..][..wide].iter_mut().zip(line).for_each(|(v, change)| *v += change);
-                map[bottom * wide..][..wide].iter_mut().zip(line).for_each(|(v, change)| *v -= change);
             }
         }
         for map in &mut work.maps {
@@ -728,17 +721,18 @@ impl Unrolled {
         work.bias.clear();
         work.bias.extend_from_slice(&block.bias);
         add_weighted(&block.whole, whole, &mut work.bias);
-        let hidden = sized(&mut work.hidden, n * channels);
-        affine(&work.inputs, &block.taxel, &work.bias, 0.0, hidden);
-        let (line, bordered) = (grid.cols * channels, (grid.cols + 2) * channels);
-        let inside = work.bordered.chunks_exact_mut(bordered).skip(1);
-        for (from, to) in hidden.chunks_exact(line).zip(inside) {
-            to[channels..channels + line].copy_from_slice(from);
+        let bordered = (grid.cols + 2) * channels;
+        let lines = work.bordered.chunks_exact_mut(bordered).skip(1);
+        for (inputs, hidden) in work.inputs.chunks_exact(grid.cols * width).zip(lines) {
+            let inside = &mut hidden[channels..][..grid.cols * channels];
+            affine(inputs, &block.taxel, &work.bias, 0.0, inside);
         }
-        let mixed = sized(&mut work.mixed, n * channels);
-        around(&work.bordered, grid.cols, &block.near, &block.near_bias, mixed);
+        let mixed = sized(&mut work.mixed, grid.cols * channels);
         let out = sized(&mut work.out, n * weights.outputs);
-        affine(mixed, &block.output, &block.output_bias, f32::NEG_INFINITY, out);
+        for (row, out) in out.chunks_exact_mut(grid.cols * weights.outputs).enumerate() {
+            around(&work.bordered[row * bordered..][..3 * bordered], &block.near, &block.near_bias, mixed);
+            affine(mixed, &block.output, &block.output_bias, f32::NEG_INFINITY, out);
+        }
     }
 
     /// What the samples make of the mean and the variances: x, d, g, m, q₁ and q₂ of the next block; returned is r.
@@ -776,7 +770,7 @@ impl Unrolled {
         solve_upper(&work.lower, m, &mut work.u);
         singles(work.u.iter().copied(), lanes, &mut work.u32);
         products(&work.phi, &work.u32, sized(&mut work.back, n));
-        products(&work.wider, &work.u32, sized(&mut work.back_wide, n));
+        blurred(&work.back, grid, 1, &mut work.passed, &mut work.back_wide);
         work.back_wide.iter_mut().zip(&work.together).for_each(|(v, q)| *v *= q * q);
         blurred(&work.back_wide, grid, 1, &mut work.passed, &mut work.smooth);
         let length = single(0.3 / (norm(&work.u).powi(2) + 1e-20).sqrt());
@@ -796,7 +790,13 @@ fn smooth(values: &[f32], grid: &Grid, near: &[Vec<f32>; 2], lanes: usize, passe
     let (passed, out) = (sized(passed, values.len()), sized(out, values.len()));
     apply(values, &near[0], [grid.rows, line], passed);
     for (from, to) in passed.chunks_exact(line).zip(out.chunks_exact_mut(line)) {
-        apply(from, &near[1], [grid.cols, lanes], to);
+        if lanes == 1 {
+            // the Gaussian is symmetric
+            to.fill(0.0);
+            add_weighted(&near[1], from, to);
+        } else {
+            apply(from, &near[1], [grid.cols, lanes], to);
+        }
     }
 }
 
@@ -811,24 +811,45 @@ fn blurred(values: &[f32], grid: &Grid, lanes: usize, passed: &mut Vec<f32>, out
 }
 
 impl Scratch {
-    /// The rows, scaled to a root mean square of 1, as rows and as N × samples; returns what they were divided by, 0
-    /// for rows that are all zero.
-    fn scale_rows(&mut self, power: f64, problem: &Problem<'_>) -> f64 {
-        let (a, n) = (problem.matrix(), problem.matrix().ncols());
-        divide_into(a.values(), power, &mut self.rows);
-        let rms = norm(&self.rows) / (self.rows.len() as f64).sqrt();
+    /// The rows, scaled to a root mean square of 1, as N × samples and as sums over the taxels above and left; returns
+    /// what they were divided by, 0 for rows that are all zero.
+    ///
+    /// # Errors
+    /// [`Refusal`] for a NaN or an infinity.
+    fn scale_rows(&mut self, a: MatrixView<'_>, cols: usize) -> Result<f64, Refusal> {
+        let (m, n, mut values, mut power) = (a.nrows(), a.ncols(), a.values(), 1.0);
+        let mut square = dot(values, values);
+        if !ORDINARY.contains(&square) {
+            power = operator_scale(a)?;
+            divide_into(values, power, &mut self.rows);
+            values = &self.rows;
+            square = dot(values, values);
+        }
+        let rms = (square / values.len() as f64).sqrt();
         let scale = if rms > 0.0 { 1.0 / rms } else { 0.0 };
-        let lanes = a.nrows().next_multiple_of(LANES);
-        self.phi.clear();
-        self.phi.resize(n * lanes, 0.0);
-        self.rows.iter_mut().for_each(|v| *v *= scale);
-        for (i, row) in self.rows.chunks_exact(n.max(1)).enumerate() {
-            for (k, v) in row.iter().enumerate() {
-                self.phi[k * lanes + i] = single(*v);
+        transpose(values, n, scale, zeros(&mut self.phi, n * m.next_multiple_of(LANES)));
+        let width = line_width(cols);
+        let integral = sized(&mut self.integral, (n / cols + 1) * m * width);
+        integral[..m * width].fill(0.0);
+        for (i, row) in values.chunks_exact(n).enumerate() {
+            for (r, values) in row.chunks_exact(cols).enumerate() {
+                let (above, own) = integral.split_at_mut((r + 1) * m * width);
+                let (above, own) = (&above[(r * m + i) * width..][..cols + 1], &mut own[i * width..][..cols + 1]);
+                let mut sum = 0.0;
+                own[0] = 0.0;
+                for ((own, above), v) in own[1..].iter_mut().zip(&above[1..]).zip(values) {
+                    sum += single(scale * v);
+                    *own = above + sum;
+                }
             }
         }
-        power * rms
+        Ok(power * rms)
     }
+}
+
+/// Numbers in a row of sums over `cols` taxels: one more, and a lane to read on.
+fn line_width(cols: usize) -> usize {
+    (cols + 1 + LANES).next_multiple_of(LANES)
 }
 
 /// `values` in single precision, with zeros up to `lanes`.
@@ -923,7 +944,7 @@ pub(super) fn agree(image: &mut [f64], order: &[usize], count: usize) {
 mod tests {
     use super::*;
     use crate::checks::says;
-    use crate::matrix::{Matrix, MatrixView};
+    use crate::matrix::Matrix;
     use crate::metrics::support;
     use nalgebra::{DMatrix, DVector};
     use rand::{RngExt as _, SeedableRng as _};
