@@ -155,7 +155,7 @@ fn stops(board: &AnytimeBoard) -> Vec<Chart> {
         let curve = move |r: &AnytimeRow| {
             let style = match r.key.sensing {
                 Sensing::Random => Style::Twin,
-                Sensing::Chosen => Style::Raster,
+                Sensing::Chosen | Sensing::WorstKind => Style::Raster,
             };
             let (shade, how) = match r.key.confidence {
                 Some(_) => (0, "stops when sure"),
