@@ -208,6 +208,39 @@ mod tests {
         }
     }
 
+    /// Of the seventeen families of shapes, the one of which most is left is seen better than at rows for the mean, and
+    /// no family much worse; training images of one kind are refused.
+    #[test]
+    fn rows_for_the_worst_family_lower_what_is_left_of_it() {
+        use spts_models::{SkinLayout, Streams};
+        use spts_recon::rows::posterior_trace;
+        let data = TrainingData::for_shapes(&SkinLayout::default(), Streams::new(1)).unwrap();
+        let (all, kinds) = data.expected(ImagePrior::UNSEEN, Tolerances::default(), true).unwrap();
+        assert_eq!(kinds.names.len(), 17);
+        let candidates = Random.design(&RowTask::new(150, &all)).unwrap();
+        for (m, gained, lost) in [(7, 0.01, 0.03), (20, 0.01, 0.03)] {
+            let left = |kinds_counted: &[Expected]| {
+                let task = RowTask { kinds: kinds_counted, ..RowTask::new(m, &all) };
+                let chosen = choose_for_images(&task, candidates.view()).unwrap();
+                let rows: Vec<f64> = chosen.iter().flat_map(|&k| candidates.row(k)).copied().collect();
+                let rows = Matrix::from_rows(m, 100, rows).unwrap();
+                let of = |expected| posterior_trace(&RowTask { expected, ..RowTask::new(m, &all) }, &rows).unwrap();
+                kinds.expected.iter().map(of).collect::<Vec<f64>>()
+            };
+            let (own, for_mean) = (left(&kinds.expected), left(&[]));
+            let worst = |shares: &[f64]| shares.iter().copied().fold(0.0, f64::max);
+            let each: Vec<_> = kinds.names.iter().zip(own.iter().zip(&for_mean)).collect();
+            assert!(worst(&own) < worst(&for_mean) - gained, "M = {m}: {each:.3?}");
+            assert!(own.iter().zip(&for_mean).all(|(own, mean)| own < &(mean + lost)), "M = {m}: {each:.3?}");
+        }
+        let one = TrainingData::of_images(Matrix::from_column_slices(4, &[vec![1.0; 4]]), &[1], 2, Streams::new(1));
+        let refused = RowChooser::new(&one.unwrap(), true).unwrap_err().to_string();
+        assert!(
+            refused.contains("`--worst-kind`: the images to learn from have 1 kind; valid: at least 2"),
+            "{refused}"
+        );
+    }
+
     /// A window of fewer measurements begins the longer one; a lost sample is in none.
     #[test]
     fn the_first_rows_are_a_choice_of_their_own_and_lost_samples_are_no_candidates() {

@@ -238,8 +238,8 @@ impl Worth for Separation<'_> {
 }
 
 /// Selects `task.rows` rows of `candidates` (C × N), and returns their numbers in order of selection. Each is the row
-/// that reduces the trace of the posterior covariance most, or with [`RowTask::kinds`] the largest share of a kind's trace;
-/// see `greedy` in [`super::DESIGNERS`]. No row is selected twice.
+/// that reduces the trace of the posterior covariance most, or with [`RowTask::kinds`] the largest share of a kind's
+/// trace; see `greedy` in [`super::DESIGNERS`]. No row is selected twice.
 ///
 /// Costs O(C N) for each row and kind, because P a is kept for every candidate.
 ///

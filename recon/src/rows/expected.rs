@@ -472,6 +472,22 @@ mod tests {
         }
     }
 
+    /// By hand: 3 images of 9 taxels count a quarter, at the trace of their own.
+    #[test]
+    fn few_images_are_drawn_towards_all() {
+        let like = |deviation: f64, corner: f64| {
+            let mut covariance = Gaussian::white(9, deviation).unwrap().covariance().clone();
+            (covariance.row_mut(0)[8], covariance.row_mut(8)[0]) = (corner, corner);
+            let prior = Gaussian::new(vec![0.0; 9], covariance).unwrap();
+            Expected::like(&prior, [3, 3], Tolerances::default()).unwrap()
+        };
+        let (own, all) = (like(1.0, 0.4), like(2.0, 0.0));
+        let drawn = own.drawn_towards(&all, 3).unwrap();
+        assert!((drawn.covariance().row(0)[8] - 0.1).abs() < 1e-8);
+        assert!((drawn.variance() - 9.0).abs() < 1e-7 && (drawn.random_square() - 9.0).abs() < 1e-7);
+        assert!(own.drawn_towards(&Expected::smooth([2, 2], 1.0).unwrap(), 3).is_err());
+    }
+
     #[test]
     fn what_does_not_fit_is_refused() {
         let prior = Gaussian::white(6, 1.0).unwrap();

@@ -19,10 +19,11 @@ use spts_input::Refusal;
 /// reduction by a row a is |P a|² / (aᵀP a + σ²). The search for a row starts from the signs of P's leading
 /// eigenvectors, of pairs of them, and of random vectors; single levels then change as long as the reduction grows.
 ///
-/// With [`RowTask::kinds`], each row is the one that leaves least of Σₖ ρₖᵖ, with p = 16 and the shares ρₖ = tr Pₖ /
-/// tr Cₖ of all K kinds: a smooth form of the largest share, which it exceeds by a factor of at most K^(1/p). The largest
-/// share itself would stall where two kinds tie, since no row that helps one of them lowers it (A. Krause et al., J.
-/// Mach. Learn. Res. 9 (2008) 2761, §3). The eigenvectors are those of Σₖ ρₖᵖ⁻¹ Pₖ / tr Cₖ, the slope of that sum.
+/// With [`RowTask::kinds`], each row is the one that leaves least of Σₖ ρₖᵖ, with p = 4 and the shares ρₖ = tr Pₖ /
+/// tr Cₖ of all K kinds: a smooth form of the largest share, which it exceeds by a factor of at most K in the power p.
+/// The largest share itself would stall where two kinds tie, since no row that helps one of them lowers it (A. Krause
+/// et al., J. Mach. Learn. Res. 9 (2008) 2761, §3). The eigenvectors are those of Σₖ ρₖᵖ⁻¹ Pₖ / tr Cₖ, the slope of
+/// that sum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Greedy;
 

@@ -46,7 +46,7 @@ pub struct RowTask<'a> {
     /// Expected images.
     pub expected: &'a Expected,
     /// Kinds of these images, each with second moments of its own. With any, `greedy` and [`choose_for_images`] take
-    /// the row that most lowers the largest share of a kind's variance that is left, made smooth: Σₖ (tr Pₖ / tr Cₖ)¹⁶
+    /// the row that most lowers the largest share of a kind's variance that is left, made smooth: Σₖ (tr Pₖ / tr Cₖ)⁴
     /// after the row, with the prior and posterior covariances Cₖ and Pₖ. Empty: the row that most lowers tr P of
     /// `expected`. The limit of the sums is that of `expected`. All other designers refuse kinds.
     pub kinds: &'a [Expected],
