@@ -197,6 +197,7 @@ score d --external cat --external-timeout nan | `--external-timeout` = | valid: 
 score d --external cat --external-timeout 86401 | `--external-timeout` = | valid: [0.1, 86400] s
 score --twin press/T --quick --in-time --decoder evidence | valid: nn_lmmse
 score --twin press/T --quick --in-time --sensing chosen | --sensing
+score --twin press/T --quick --worst-kind | `--worst-kind`: no rows are chosen
 score --twin press/T --quick --in-time --anytime | --anytime
 score --twin press/T --quick --in-time --save board.json | --save
 score --twin press/T --quick --anytime --confidence 0.5 | outside (0.5, 1)

@@ -60,10 +60,11 @@ pub(super) fn pressed(text: &str) -> Result<&'static ObjectSpec, String> {
     })
 }
 
-/// Parser of a way in which rows come about.
+/// Parser of a way in which rows come about; `--worst-kind` makes those that are chosen [`Sensing::WorstKind`].
 pub(super) fn sensing() -> impl TypedValueParser<Value = Sensing> {
-    let named = |name: String| Sensing::ALL.into_iter().find(|s| s.name() == name).unwrap_or_default();
-    PossibleValuesParser::new(Sensing::ALL.map(Sensing::name)).map(named)
+    let known = [Sensing::Random, Sensing::Chosen];
+    let named = move |name: String| known.into_iter().find(|s| s.name() == name).unwrap_or_default();
+    PossibleValuesParser::new(known.map(Sensing::name)).map(named)
 }
 
 /// Most measurements of one window: the scored frames of a press hold 20,000.

@@ -183,6 +183,12 @@ pub(super) struct ScoreCommand {
     /// three such windows, each from every third measurement. Chosen rows lose the order in time and have no votes
     #[arg(long, value_name = "KIND,...", value_delimiter = ',', default_value = "random", value_parser = sensing())]
     sensing: Vec<Sensing>,
+    /// Choose rows that see the worst kind of what was learned from as well as can be, in place of the mean of all; for
+    /// `--sensing chosen`. Kinds are the families of `shapes`, the objects of any other source, and the widths of blobs
+    /// for places. Rows for classes are chosen as without, for the classes that are least apart. The tables call such
+    /// rows `worst_kind`
+    #[arg(long)]
+    worst_kind: bool,
     /// Leave the times of decoding out, so that the output is the same from run to run
     #[arg(long)]
     no_times: bool,
@@ -450,12 +456,22 @@ impl ScoreCommand {
             objects: self.object.clone(),
             localisation,
             left_out: self.left_out,
-            sensing: sorted(self.sensing.clone()),
+            sensing: sorted(self.sensing()?),
             training: Vec::new(),
             network: self.weights.as_deref().map(network).transpose()?,
             times: !self.no_times,
             seed: self.seed,
         })
+    }
+
+    /// How rows are obtained.
+    fn sensing(&self) -> Result<Vec<Sensing>, CliError> {
+        if self.worst_kind && !self.sensing.contains(&Sensing::Chosen) {
+            let reason = "no rows are chosen; add `--sensing chosen`, or leave it out";
+            return Err(CliError::usage(format!("`--worst-kind`: {reason}")));
+        }
+        let worst = |sensing| if sensing == Sensing::Chosen { Sensing::WorstKind } else { sensing };
+        Ok(self.sensing.iter().map(|&sensing| if self.worst_kind { worst(sensing) } else { sensing }).collect())
     }
 
     /// Folder of the results.

@@ -69,6 +69,7 @@ fn layout([rows, cols]: [usize; 2]) -> Result<SkinLayout, CliError> {
   spts sensing design
   spts sensing design --designer cosine_signs --rows 25 --skin 12x16
   spts sensing design --designer classes --recordings recordings/ --rows 10
+  spts sensing design --worst-kind --json
   spts sensing design --largest-sum 1.5 --shift 2 --gains 0.3 --fewest-flips --json
   spts simulate press/T --set rows.patterns_file=out/sensing/rows.txt --weights firmware
 
@@ -122,6 +123,11 @@ struct DesignCommand {
     /// Largest shift of the images that the design allows for, in whole taxels; [0, 64]
     #[arg(long, value_name = "TAXELS", default_value_t = 0, value_parser = whole::<usize>(0..=64))]
     shift: usize,
+    /// See the worst kind of images as well as can be, in place of the mean of all: each row is the one that most
+    /// lowers the largest share of a kind's variance that is left. Kinds are the outlines of the random shapes, or the
+    /// objects of --recordings. Only for the designer greedy, and not with --smooth
+    #[arg(long)]
+    worst_kind: bool,
     /// Write the rows in the order in which the fewest weights change from row to row, in place of the best rows first
     #[arg(long)]
     fewest_flips: bool,
@@ -151,6 +157,7 @@ impl DesignCommand {
             noise: self.noise,
             largest_sum: self.largest_sum,
             tolerances: Tolerances { gain_log_sd: self.gains, shift: self.shift },
+            worst_kind: self.worst_kind,
             fewest_flips: self.fewest_flips,
             seed: self.seed,
         };

@@ -517,7 +517,7 @@ pub fn table(board: &AnytimeBoard) -> String {
         }
     }
     out.push_str("\nwanted: confidence at which a window ends, fixed: all windows take as many samples; stated: mean confidence of the windows that reached it; never: share that did not, which count with all of their samples; error: expected calibration error, mean over the objects, and of the worst object\n");
-    if board.rows.iter().any(|r| r.key.sensing == Sensing::Chosen) {
+    if board.rows.iter().any(|r| r.key.sensing != Sensing::Random) {
         out.push_str("chosen rows: picked from those of a press for what was learned, before a sample is seen; their order in time is lost\n");
     }
     out.push_str(&objects(board));

@@ -19,7 +19,7 @@ use spts_recon::{Matrix, MatrixView};
 /// ```
 /// use spts_eval::Sensing;
 ///
-/// assert_eq!(Sensing::ALL.map(Sensing::name), ["random", "chosen"]);
+/// assert_eq!(Sensing::ALL.map(Sensing::name), ["random", "chosen", "worst_kind"]);
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Default, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
@@ -29,17 +29,21 @@ pub enum Sensing {
     Random,
     /// Rows selected from those of a press for the decoder's training data, before any sample is used.
     Chosen,
+    /// As [`Self::Chosen`], for the kind of the training images of which most is left ([`RowTask::kinds`]) in place of
+    /// their mean. Rows for classes are those of [`Self::Chosen`], for the classes that are least apart.
+    WorstKind,
 }
 
 impl Sensing {
-    /// Both ways.
-    pub const ALL: [Self; 2] = [Self::Random, Self::Chosen];
+    /// All ways.
+    pub const ALL: [Self; 3] = [Self::Random, Self::Chosen, Self::WorstKind];
 
     /// Name on the command line and in files.
     pub fn name(self) -> &'static str {
         match self {
             Self::Random => "random",
             Self::Chosen => "chosen",
+            Self::WorstKind => "worst_kind",
         }
     }
 }
@@ -57,16 +61,17 @@ const NOISE: f64 = RowTask::NOISE;
 #[derive(Debug, Clone)]
 pub struct RowChooser {
     images: Expected,
+    kinds: Vec<Expected>,
     classes: Vec<Component>,
 }
 
 impl RowChooser {
-    /// A chooser for images and classes like those of `data`.
+    /// A chooser for images and classes like those of `data`; with `worst_kind`, for the worst kind of the images.
     ///
     /// # Errors
-    /// [`Refusal`] if they make no prior.
-    pub fn new(data: &TrainingData) -> Result<Self, Refusal> {
-        let prior = data.prior(ImagePrior::UNSEEN)?;
+    /// [`Refusal`] if they make no prior, and with `worst_kind` if they are of fewer than two kinds.
+    pub fn new(data: &TrainingData, worst_kind: bool) -> Result<Self, Refusal> {
+        let (images, kinds) = data.expected(ImagePrior::UNSEEN, Tolerances::default(), worst_kind)?;
         let templates = &data.templates;
         let several = templates.labels().iter().any(|label| *label != templates.labels()[0]);
         let classes = if several {
@@ -75,10 +80,7 @@ impl RowChooser {
         } else {
             Vec::new()
         };
-        Ok(Self {
-            images: Expected::like(&prior, data.shape, Tolerances::default()).map_err(|e| e.at("rows"))?,
-            classes,
-        })
+        Ok(Self { images, kinds: kinds.expected, classes })
     }
 
     /// Three windows of `press`, each of up to `most` measurements in the order of their choice: for images, and for
@@ -89,8 +91,9 @@ impl RowChooser {
     pub(crate) fn windows(&self, press: &Press, most: usize, classes: bool) -> Result<[Vec<Press>; 2], Refusal> {
         let [share, of] = CANDIDATES;
         let pool = (press.len() * share / of).max(1).min(press.len());
-        let task = task(&self.images, &self.classes);
-        let images = chosen(press, pool, most, |rows, m| choose_for_images(&RowTask { rows: m, ..task }, rows))?;
+        let task = RowTask { classes: &self.classes, noise: NOISE, ..RowTask::new(1, &self.images) };
+        let of_images = RowTask { kinds: &self.kinds, ..task };
+        let images = chosen(press, pool, most, |rows, m| choose_for_images(&RowTask { rows: m, ..of_images }, rows))?;
         let classes = if classes && !self.classes.is_empty() {
             chosen(press, pool, most, |rows, m| choose_for_classes(&RowTask { rows: m, ..task }, rows))?
         } else {
@@ -100,25 +103,29 @@ impl RowChooser {
     }
 }
 
-fn task<'a>(expected: &'a Expected, classes: &'a [Component]) -> RowTask<'a> {
-    RowTask { classes, noise: NOISE, ..RowTask::new(1, expected) }
-}
-
-/// Windows of `press` whose rows tell places of blobs, of up to `most` measurements each.
+/// Windows of `press` whose rows tell places of blobs, of up to `most` measurements each. With `worst_kind`, the blobs
+/// of every width are a kind.
 ///
 /// # Errors
 /// [`Refusal`] when the rows do not fill the sheet.
-pub(crate) fn chosen_places(press: &Press, shape: [usize; 2], most: usize) -> Result<Vec<Press>, Refusal> {
-    let blobs = blobs(shape);
+pub(crate) fn chosen_places(
+    press: &Press,
+    shape: [usize; 2],
+    most: usize,
+    worst_kind: bool,
+) -> Result<Vec<Press>, Refusal> {
     let how = ImagePrior { reach: 0, stay: 1.0, threshold: 0.0, ..ImagePrior::UNSEEN };
-    let prior = how.learn(&blobs, shape[1])?;
-    let expected = Expected::like(&prior, shape, Tolerances::default())?;
-    let task = task(&expected, &[]);
+    let like =
+        |widths: &[f64]| Expected::like(&how.learn(&blobs(shape, widths), shape[1])?, shape, Tolerances::default());
+    let expected = like(&WIDTHS_PX)?;
+    let kinds = WIDTHS_PX.iter().filter(|_| worst_kind).map(|width| like(&[*width]));
+    let kinds = kinds.collect::<Result<Vec<_>, _>>()?;
+    let task = RowTask { kinds: &kinds, noise: NOISE, ..RowTask::new(1, &expected) };
     chosen(press, press.len(), most, |rows, m| choose_for_images(&RowTask { rows: m, ..task }, rows))
 }
 
-/// One round blob at every taxel, of every width that the locator knows.
-fn blobs(shape: [usize; 2]) -> Matrix {
+/// One round blob at every taxel, of each of the `widths`, taxels.
+fn blobs(shape: [usize; 2], widths: &[f64]) -> Matrix {
     let [rows, cols] = shape;
     let blob = |width: f64, centre: usize| {
         let at = |k: usize| {
@@ -127,7 +134,7 @@ fn blobs(shape: [usize; 2]) -> Matrix {
         };
         (0..rows * cols).map(at).collect::<Vec<f64>>()
     };
-    let all = WIDTHS_PX.iter().flat_map(|&width| (0..rows * cols).map(move |centre| (width, centre)));
+    let all = widths.iter().flat_map(|&width| (0..rows * cols).map(move |centre| (width, centre)));
     let images: Vec<Vec<f64>> = all.map(|(width, centre)| blob(width, centre)).collect();
     Matrix::from_column_slices(rows * cols, &images)
 }
@@ -173,7 +180,7 @@ mod tests {
     }
 
     fn windows(volts: Vec<f64>, most: usize) -> Vec<(Vec<f64>, Vec<f64>)> {
-        let found = chosen_places(&press(volts), SHAPE, most).unwrap();
+        let found = chosen_places(&press(volts), SHAPE, most, false).unwrap();
         let all = found.iter().map(|press| press.window(0, most).unwrap());
         all.map(|w| (w.phi.values().to_vec(), w.y.to_vec())).collect()
     }
@@ -199,6 +206,39 @@ mod tests {
                 assert_eq!(all.window(at, 1).unwrap().phi.values(), row);
             }
         }
+    }
+
+    /// The seventeen families of shapes are much alike: the one of which most is left is seen no worse than at rows for
+    /// the mean, and no family much worse. Training images of one kind are refused.
+    #[test]
+    fn rows_for_the_worst_family_lose_no_other() {
+        use spts_models::{SkinLayout, Streams};
+        use spts_recon::rows::posterior_trace;
+        let data = TrainingData::for_shapes(&SkinLayout::default(), Streams::new(1)).unwrap();
+        let (all, kinds) = data.expected(ImagePrior::UNSEEN, Tolerances::default(), true).unwrap();
+        assert_eq!(kinds.names.len(), 17);
+        let candidates = Random.design(&RowTask::new(150, &all)).unwrap();
+        for m in [7, 20] {
+            let left = |kinds_counted: &[Expected]| {
+                let task = RowTask { kinds: kinds_counted, ..RowTask::new(m, &all) };
+                let chosen = choose_for_images(&task, candidates.view()).unwrap();
+                let rows: Vec<f64> = chosen.iter().flat_map(|&k| candidates.row(k)).copied().collect();
+                let rows = Matrix::from_rows(m, 100, rows).unwrap();
+                let of = |expected| posterior_trace(&RowTask { expected, ..RowTask::new(m, &all) }, &rows).unwrap();
+                kinds.expected.iter().map(of).collect::<Vec<f64>>()
+            };
+            let (own, for_mean) = (left(&kinds.expected), left(&[]));
+            let worst = |shares: &[f64]| shares.iter().copied().fold(0.0, f64::max);
+            let each: Vec<_> = kinds.names.iter().zip(own.iter().zip(&for_mean)).collect();
+            assert!(worst(&own) < worst(&for_mean) + 0.005, "M = {m}: {each:.3?}");
+            assert!(own.iter().zip(&for_mean).all(|(own, mean)| *own < mean + 0.03), "M = {m}: {each:.3?}");
+        }
+        let one = TrainingData::of_images(Matrix::from_column_slices(4, &[vec![1.0; 4]]), &[1], 2, Streams::new(1));
+        let refused = RowChooser::new(&one.unwrap(), true).unwrap_err().to_string();
+        assert!(
+            refused.contains("`--worst-kind`: the images to learn from have 1 kind; valid: at least 2"),
+            "{refused}"
+        );
     }
 
     /// A window of fewer measurements begins the longer one; a lost sample is in none.

@@ -157,7 +157,7 @@ fn stops(board: &AnytimeBoard) -> Vec<Chart> {
         let curve = move |r: &AnytimeRow| {
             let style = match r.key.sensing {
                 Sensing::Random => Style::Twin,
-                Sensing::Chosen => Style::Raster,
+                Sensing::Chosen | Sensing::WorstKind => Style::Raster,
             };
             let (shade, how) = match r.key.confidence {
                 Some(_) => (0, "stops when sure"),
@@ -197,7 +197,7 @@ fn reliability(board: &AnytimeBoard) -> Vec<Chart> {
         }
         let curve = move |((decoder, sensing, left_out, learned), _): ((&str, Sensing, bool, &str), Stated)| {
             let whose = if left_out { "left out" } else { learned };
-            let stroke = Stroke::of(usize::from(sensing == Sensing::Chosen));
+            let stroke = Stroke::of(usize::from(sensing != Sensing::Random));
             Curve::of_decoder(format!("{}, {} rows, {whose}", short_label(decoder), sensing.name()), decoder, stroke)
         };
         Plot::new(points)

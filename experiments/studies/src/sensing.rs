@@ -4,10 +4,11 @@ use serde::Serialize;
 use spts::progress::Progress;
 use spts_circuit::{Patterns, WeightMode, Weights, seeds_of_first_window};
 use spts_eval::Source;
-use spts_eval::training::TrainingData;
+use spts_eval::training::{Kinds, TrainingData};
 use spts_firmware::{FIRST_ADDRESS, LAST_BUS_ADDRESS, PATTERN_BITS, Pattern};
 use spts_input::Refusal;
 use spts_models::{SkinLayout, Streams};
+use spts_recon::Matrix;
 use spts_recon::classify::{Component, TemplateModel};
 use spts_recon::recover::ImagePrior;
 use spts_recon::rows::{
@@ -19,6 +20,8 @@ use std::path::PathBuf;
 const BUS: [f64; 3] = [2.0, 9.0, 400e3];
 /// Cells on a bus.
 const BUS_CELLS: usize = (LAST_BUS_ADDRESS - FIRST_ADDRESS) as usize + 1;
+/// The designer that weighs kinds of images.
+const WEIGHS_KINDS: &str = "greedy";
 /// Random designs that a design is compared with.
 const RANDOM: u64 = 16;
 
@@ -50,10 +53,23 @@ pub struct RowDesign {
     pub largest_sum: Option<f64>,
     /// Differences that images may have from the expected ones.
     pub tolerances: Tolerances,
+    /// Whether the kind of images of which most is left counts, in place of the mean of all images.
+    pub worst_kind: bool,
     /// Whether rows are ordered so that cells change least.
     pub fewest_flips: bool,
     /// Seed of all random numbers.
     pub seed: u64,
+}
+
+/// How well rows see one kind of the expected images.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct KindLeft {
+    /// Outline of the random shapes, or object of the recordings.
+    pub kind: String,
+    /// Share of the kind's variance that remains after the M measurements.
+    pub variance_left: f64,
+    /// The same share after as many rows that were designed for the mean of all images.
+    pub variance_left_for_mean: f64,
 }
 
 /// Results of `spts sensing design`: the rows, with what they are like.
@@ -74,6 +90,9 @@ pub struct RowDesignReport {
     pub variance_left: f64,
     /// The same share for random signs; mean of sixteen.
     pub variance_left_random: f64,
+    /// What is left of every kind; empty where the mean of all images counts.
+    #[serde(skip_serializing_if = "Vec::is_empty")]
+    pub kinds: Vec<KindLeft>,
     /// Largest root mean square of a row's sum over the expected images, relative to a random row's.
     pub largest_sum: f64,
     /// Mean share of the cells whose level changes from one row to the next and from the last to the first.
@@ -102,14 +121,21 @@ impl RowDesign {
     ///
     /// # Errors
     /// [`Refusal`] for a task out of range, recordings that cannot be read, or images from which no prior can be
-    /// made.
+    /// made; with `worst_kind` for another designer than `greedy`, or images of fewer than two kinds.
     pub fn run(&self, progress: &dyn Progress) -> Result<RowDesignReport, Refusal> {
+        if self.worst_kind && self.designer.name != WEIGHS_KINDS {
+            return Err(Refusal::new(format!(
+                "`--worst-kind` with `--designer` = {}; valid: {WEIGHS_KINDS}, which alone weighs kinds of images",
+                self.designer.name
+            )));
+        }
         progress.stage("expected images", None);
-        let (expected, classes) = self.expected()?;
-        progress.stage("designing rows", Some(self.rows));
+        let (expected, kinds, classes) = self.expected()?;
+        progress.stage("designing rows", Some(self.rows * (1 + usize::from(self.worst_kind))));
         let row_found = || progress.step();
         let task = RowTask {
             row_found: &row_found,
+            kinds: &kinds.expected,
             classes: &classes,
             noise: self.noise,
             largest_sum: self.largest_sum,
@@ -117,6 +143,9 @@ impl RowDesign {
             ..RowTask::new(self.rows, &expected)
         };
         let rows = (self.designer.build)().design(&task)?;
+        // figures from here on are of all images, or of one kind
+        let task = RowTask { kinds: &[], ..task };
+        let for_mean = if self.worst_kind { Some((self.designer.build)().design(&task)?) } else { None };
         progress.stage("comparing with random rows", None);
         let taxels = rows.ncols();
         let order =
@@ -134,7 +163,13 @@ impl RowDesign {
         let message = (rows.nrows() <= PATTERN_BITS)
             .then(|| Pattern::new(rows.nrows(), 0).ok().map(|pattern| pattern.message().len()))
             .flatten();
+        let kinds = kinds.names.into_iter().zip(&kinds.expected).zip(for_mean.iter().cycle());
+        let kinds = kinds.map(|((kind, expected), for_mean)| {
+            let left = |rows: &Matrix| posterior_trace(&RowTask { expected, ..task }, rows);
+            Ok(KindLeft { kind, variance_left: left(&rows)?, variance_left_for_mean: left(for_mean)? })
+        });
         Ok(RowDesignReport {
+            kinds: kinds.collect::<Result<_, Refusal>>()?,
             designer: self.designer.name,
             label: self.designer.label,
             skin: expected.shape(),
@@ -154,14 +189,20 @@ impl RowDesign {
         })
     }
 
-    /// Images, and classes where there are some.
-    fn expected(&self) -> Result<(Expected, Vec<Component>), Refusal> {
+    /// Images, their kinds if the worst one counts, and classes where there are some.
+    fn expected(&self) -> Result<(Expected, Kinds, Vec<Component>), Refusal> {
         let shape = [self.layout.rows(), self.layout.cols()];
         let streams = Streams::new(self.seed);
         let (data, classes) = match &self.images {
+            DesignImages::Smooth(_) if self.worst_kind => {
+                return Err(Refusal::new(
+                    "`--worst-kind` with `--smooth`: smooth images have no kinds; valid: random shapes (without \
+                     `--smooth`) or `--recordings`",
+                ));
+            }
             DesignImages::Smooth(length) => {
                 let expected = Expected::smooth(shape, *length)?;
-                return Ok((expected, Vec::new()));
+                return Ok((expected, Kinds::default(), Vec::new()));
             }
             DesignImages::Shapes => {
                 let data = TrainingData::for_layout(&self.layout, streams)?;
@@ -176,9 +217,8 @@ impl RowDesign {
                 (data, classes?)
             }
         };
-        let prior = data.prior(ImagePrior::UNSEEN)?;
-        let expected = Expected::like(&prior, data.shape, self.tolerances)?;
-        Ok((expected, classes))
+        let (expected, kinds) = data.expected(ImagePrior::UNSEEN, self.tolerances, self.worst_kind)?;
+        Ok((expected, kinds, classes))
     }
 }
 
@@ -219,6 +259,17 @@ impl RowDesignReport {
             self.largest_sum,
             100.0 * self.flips,
         );
+        let worst = |left: fn(&KindLeft) -> f64| self.kinds.iter().max_by(|a, b| left(a).total_cmp(&left(b)));
+        if let (Some(worst), Some(for_mean)) = (worst(|k| k.variance_left), worst(|k| k.variance_left_for_mean)) {
+            out.push_str(&format!(
+                "worst of {} kinds: {}, of whose variance {:.1} % is left; of rows for the mean, {} with {:.1} %\n",
+                self.kinds.len(),
+                worst.kind,
+                100.0 * worst.variance_left,
+                for_mean.kind,
+                100.0 * for_mean.variance_left_for_mean,
+            ));
+        }
         if self.constant_rows > 0 {
             out.push_str(&format!("{} of the rows are constant: all taxels have the same level\n", self.constant_rows));
         }
@@ -251,6 +302,7 @@ mod tests {
             noise: RowTask::NOISE,
             largest_sum: None,
             tolerances: Tolerances::default(),
+            worst_kind: false,
             fewest_flips: false,
             seed: 1,
         }
@@ -279,8 +331,29 @@ mod tests {
         }
     }
 
+    /// Outlines are much alike: the worst is seen as well as with rows for the mean of all, and no outline is lost.
+    #[test]
+    fn rows_for_the_worst_kind_say_what_is_left_of_each() {
+        let report = RowDesign { worst_kind: true, ..design("greedy", DesignImages::Shapes) }.run(&()).unwrap();
+        let names: Vec<&str> = report.kinds.iter().map(|k| k.kind.as_str()).collect();
+        assert_eq!(names, ["angle", "cross", "ellipse", "plate", "ring"]);
+        let worst = |left: fn(&KindLeft) -> f64| report.kinds.iter().map(left).fold(0.0, f64::max);
+        let (own, for_mean) = (worst(|k| k.variance_left), worst(|k| k.variance_left_for_mean));
+        assert!(own < for_mean + 0.005, "{:?}", report.kinds);
+        assert!(report.kinds.iter().all(|k| k.variance_left < k.variance_left_for_mean + 0.05), "{:?}", report.kinds);
+        assert!(report.text().contains("worst of 5 kinds: "), "{}", report.text());
+        let plain = design("greedy", DesignImages::Shapes).run(&()).unwrap();
+        assert!(plain.kinds.is_empty() && !serde_json::to_string(&plain).unwrap().contains("kinds"));
+    }
+
     #[test]
     fn what_cannot_be_designed_is_refused() {
+        let worst = |name, images| {
+            let refused = RowDesign { worst_kind: true, ..design(name, images) }.run(&());
+            refused.unwrap_err().to_string()
+        };
+        assert!(worst("separable", DesignImages::Shapes).contains("`--designer` = separable; valid: greedy"));
+        assert!(worst("greedy", DesignImages::Smooth(1.5)).contains("smooth images have no kinds"));
         let few = RowDesign { rows: 0, ..design("greedy", DesignImages::Shapes) };
         assert!(few.run(&()).is_err());
         assert!(design("classes", DesignImages::Shapes).run(&()).is_err());

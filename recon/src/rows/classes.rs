@@ -4,9 +4,10 @@ use crate::classify::Component;
 use crate::kernels::{adjoint, axpy, dot};
 use crate::matrix::{Matrix, MatrixView};
 use crate::posterior::GaussianPosterior;
-use crate::rows::expected::Headroom;
+use crate::rows::expected::{Expected, Headroom};
 use crate::rows::greedy::random_signs;
 use crate::rows::greedy::{Worth, best_row};
+use crate::rows::kinds::{Trace, worth};
 use crate::rows::other_grid;
 use crate::rows::{DesignRows, RowTask};
 use rand::SeedableRng as _;
@@ -27,7 +28,7 @@ const SEARCH: (usize, usize) = (24, 3);
 
 impl DesignRows for Classes {
     fn design(&self, task: &RowTask<'_>) -> Result<Matrix, Refusal> {
-        task.check(1 << 16, "so many rows are of no use")?;
+        task.check_without_kinds("classes", 1 << 16, "so many rows are of no use")?;
         let n = task.expected.taxels();
         let mut apart = Apart::new(task.classes, task.expected.shape())?;
         let headroom = Headroom::of(task);
@@ -237,10 +238,10 @@ impl Worth for Separation<'_> {
 }
 
 /// Selects `task.rows` rows of `candidates` (C × N), and returns their numbers in order of selection. Each is the row
-/// that reduces the trace of the posterior covariance most; see `greedy` in [`super::DESIGNERS`]. No row is selected
-/// twice.
+/// that reduces the trace of the posterior covariance most, or with [`RowTask::kinds`] the largest share of a kind's
+/// trace; see `greedy` in [`super::DESIGNERS`]. No row is selected twice.
 ///
-/// Costs O(C N) for each row, because P a is kept for every candidate.
+/// Costs O(C N) for each row and kind, because P a is kept for every candidate.
 ///
 /// ```
 /// use spts_recon::Matrix;
@@ -261,34 +262,65 @@ impl Worth for Separation<'_> {
 /// [`Refusal`] if the task is out of range, the candidates have another number of taxels, or there are too few.
 pub fn choose_for_images(task: &RowTask<'_>, candidates: MatrixView<'_>) -> Result<Vec<usize>, Refusal> {
     let n = check(task, candidates)?;
-    let covariance = task.expected.covariance();
-    let variance = task.variance();
     let rows: Vec<&[f64]> = candidates.values().chunks_exact(n).collect();
-    // P a of every candidate, |P a|² and aᵀP a
-    let mut products = vec![0.0; rows.len() * n];
-    for (product, row) in products.chunks_exact_mut(n).zip(&rows) {
-        crate::kernels::adjoint(covariance.view().values(), row, product);
-    }
-    let mut falls: Vec<(f64, f64)> = products.chunks_exact(n).zip(&rows).map(|(u, a)| (dot(u, u), dot(u, a))).collect();
+    let mut kinds: Vec<Candidates> = task.gaussians().iter().map(|of| Candidates::new(task, of, &rows)).collect();
     let mut chosen = Vec::with_capacity(task.rows);
     let mut left = vec![true; rows.len()];
-    let mut u = vec![0.0; n];
     while chosen.len() < task.rows {
-        let fall = |k: usize| falls[k].0 / (falls[k].1.max(0.0) + variance);
-        let each = (0..rows.len()).filter(|k| left[*k]).map(|k| (fall(k), k));
+        let worth = |k: usize| worth(kinds.iter().map(|kind| (kind.trace, kind.fall(k))));
+        let each = (0..rows.len()).filter(|k| left[*k]).map(|k| (worth(k), k));
         let Some((_, best)) = each.reduce(|a, b| if b.0 > a.0 { b } else { a }) else {
             break;
         };
         chosen.push(best);
         left[best] = false;
-        u.copy_from_slice(&products[best * n..(best + 1) * n]);
-        let d = falls[best].1.max(0.0) + variance;
-        for ((product, row), fall) in products.chunks_exact_mut(n).zip(&rows).zip(&mut falls) {
-            axpy(-dot(row, &u) / d, &u, product);
-            *fall = (dot(product, product), dot(product, row));
-        }
+        kinds.iter_mut().for_each(|kind| kind.observe(best, &rows));
     }
     Ok(chosen)
+}
+
+/// What every candidate row says of one Gaussian, after the rows that were chosen.
+struct Candidates {
+    /// P a of every candidate, C × N.
+    products: Vec<f64>,
+    /// |P a|² and aᵀP a of every candidate.
+    parts: Vec<(f64, f64)>,
+    trace: Trace,
+    /// σ².
+    variance: f64,
+    /// P a of the row that was chosen last.
+    u: Vec<f64>,
+}
+
+impl Candidates {
+    /// Before any measurement of the images `of`.
+    fn new(task: &RowTask<'_>, of: &Expected, rows: &[&[f64]]) -> Self {
+        let n = of.taxels();
+        let covariance = of.covariance();
+        let mut products = vec![0.0; rows.len() * n];
+        for (product, row) in products.chunks_exact_mut(n).zip(rows) {
+            adjoint(covariance.view().values(), row, product);
+        }
+        let parts = products.chunks_exact(n).zip(rows).map(|(u, a)| (dot(u, u), dot(u, a))).collect();
+        Self { products, parts, trace: Trace::new(of.variance()), variance: task.variance(of), u: vec![0.0; n] }
+    }
+
+    /// How much candidate `k` lowers the trace.
+    fn fall(&self, k: usize) -> f64 {
+        self.parts[k].0 / (self.parts[k].1.max(0.0) + self.variance)
+    }
+
+    /// Measures candidate `k`.
+    fn observe(&mut self, k: usize, rows: &[&[f64]]) {
+        let n = self.u.len();
+        self.trace.lower(self.trace.left() - self.fall(k));
+        self.u.copy_from_slice(&self.products[k * n..(k + 1) * n]);
+        let d = self.parts[k].1.max(0.0) + self.variance;
+        for ((product, row), parts) in self.products.chunks_exact_mut(n).zip(rows).zip(&mut self.parts) {
+            axpy(-dot(row, &self.u) / d, &self.u, product);
+            *parts = (dot(product, product), dot(product, row));
+        }
+    }
 }
 
 /// As [`choose_for_images`], but each row is the one that reduces the bound of the errors between `task.classes` most;
@@ -298,6 +330,7 @@ pub fn choose_for_images(task: &RowTask<'_>, candidates: MatrixView<'_>) -> Resu
 /// As [`choose_for_images`], and [`Refusal`] for fewer than two classes.
 pub fn choose_for_classes(task: &RowTask<'_>, candidates: MatrixView<'_>) -> Result<Vec<usize>, Refusal> {
     let n = check(task, candidates)?;
+    task.check_without_kinds("the choice for classes", usize::MAX, "")?;
     let mut apart = Apart::new(task.classes, task.expected.shape())?;
     let rows: Vec<&[f64]> = candidates.values().chunks_exact(n).collect();
     // of every candidate, its sums over what is not explained of the templates, and aᵀP a
@@ -340,7 +373,6 @@ fn check(task: &RowTask<'_>, candidates: MatrixView<'_>) -> Result<usize, Refusa
 mod tests {
     use super::*;
     use crate::checks::says;
-    use crate::rows::expected::Expected;
     use crate::rows::greedy::posterior_trace;
     use crate::rows::simple::Random;
 

@@ -4,8 +4,9 @@ use crate::checks::within;
 use crate::kernels::{adjoint, axpy, dot};
 use crate::matrix::Matrix;
 use crate::posterior::GaussianPosterior;
-use crate::rows::expected::Headroom;
+use crate::rows::expected::{Expected, Headroom};
 use crate::rows::headroom_unreachable;
+use crate::rows::kinds::{Trace, worth};
 use crate::rows::other_grid;
 use crate::rows::{DesignRows, RowTask};
 use nalgebra::DMatrix;
@@ -17,6 +18,12 @@ use spts_input::Refusal;
 /// Rows that reduce the trace of the posterior covariance P of the expected images most, one after the other. The
 /// reduction by a row a is |P a|² / (aᵀP a + σ²). The search for a row starts from the signs of P's leading
 /// eigenvectors, of pairs of them, and of random vectors; single levels then change as long as the reduction grows.
+///
+/// With [`RowTask::kinds`], each row is the one that leaves least of Σₖ ρₖᵖ, with p = 4 and the shares ρₖ = tr Pₖ /
+/// tr Cₖ of all K kinds: a smooth form of the largest share, which it exceeds by a factor of at most K in the power p.
+/// The largest share itself would stall where two kinds tie, since no row that helps one of them lowers it (A. Krause
+/// et al., J. Mach. Learn. Res. 9 (2008) 2761, §3). The eigenvectors are those of Σₖ ρₖᵖ⁻¹ Pₖ / tr Cₖ, the slope of
+/// that sum.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Greedy;
 
@@ -24,6 +31,8 @@ pub struct Greedy;
 const SEARCH: (usize, usize) = (24, 4);
 /// Most taxels whose covariance is kept whole: 128 MiB twice.
 const MOST_TAXELS: usize = 4096;
+/// Most taxels with kinds: 32 MiB twice for each.
+const MOST_WITH_KINDS: usize = 2048;
 /// Leading eigenvectors that rows start from.
 const LEADING: usize = 8;
 /// Power iterations before the first row, and before every other one, which begins with the vectors of the last.
@@ -33,17 +42,18 @@ impl DesignRows for Greedy {
     fn design(&self, task: &RowTask<'_>) -> Result<Matrix, Refusal> {
         task.check(1 << 20, "so many rows are of no use")?;
         let n = task.expected.taxels();
-        within("taxels", n as f64, 1.0, MOST_TAXELS as f64)?;
-        let mut covariances = Covariances::new(task.expected.covariance(), task.variance());
+        within("taxels", n as f64, 1.0, if task.kinds.is_empty() { MOST_TAXELS } else { MOST_WITH_KINDS } as f64)?;
+        let mut kinds: Vec<Covariances> = task.gaussians().iter().map(|of| Covariances::new(task, of)).collect();
+        let mut weighed = vec![0.0; if kinds.len() > 1 { n * n } else { 0 }];
         let headroom = Headroom::of(task);
         let mut rng = ChaCha8Rng::seed_from_u64(task.seed);
         let mut leading = Leading::new(n, &mut rng);
         let mut rows = Matrix::zeros(task.rows, n);
         for r in 0..task.rows {
-            leading.iterate(&covariances.posterior.covariance, ITERATIONS[usize::from(r > 0)]);
+            leading.iterate(weigh(&kinds, &mut weighed), ITERATIONS[usize::from(r > 0)]);
             let starts = starts(&leading, n, &mut rng);
-            let row = best_row(task, &headroom, starts, SEARCH.1, || Fall::new(&covariances))?;
-            covariances.observe(&row);
+            let row = best_row(task, &headroom, starts, SEARCH.1, || Falls::new(&kinds))?;
+            kinds.iter_mut().for_each(|kind| kind.observe(&row));
             rows.row_mut(r).copy_from_slice(&row);
             (task.row_found)();
         }
@@ -114,7 +124,47 @@ fn unreachable_limit(task: &RowTask<'_>, headroom: Option<Headroom>) -> Refusal 
     headroom_unreachable(task.largest_sum.unwrap_or_default(), (square.max(0.0) / task.expected.random_square()).sqrt())
 }
 
-/// |P a|² / (aᵀP a + σ²).
+/// Σₖ ρₖᵖ⁻¹ Pₖ / tr Cₖ over all `kinds`, in `sum`; P of a single one.
+fn weigh<'a>(kinds: &'a [Covariances], sum: &'a mut [f64]) -> &'a [f64] {
+    if let [one] = kinds {
+        return &one.posterior.covariance;
+    }
+    let worst = kinds.iter().map(|kind| kind.trace.share(0.0)).fold(0.0, f64::max);
+    sum.fill(0.0);
+    for kind in kinds {
+        axpy(kind.trace.weight(worst), &kind.posterior.covariance, sum);
+    }
+    sum
+}
+
+/// [`worth`] of a row for all kinds.
+struct Falls<'a>(Vec<Fall<'a>>);
+
+impl<'a> Falls<'a> {
+    fn new(kinds: &'a [Covariances]) -> Self {
+        Self(kinds.iter().map(Fall::new).collect())
+    }
+}
+
+impl Worth for Falls<'_> {
+    fn start(&mut self, row: &[f64]) {
+        self.0.iter_mut().for_each(|fall| fall.start(row));
+    }
+
+    fn worth(&self) -> f64 {
+        worth(self.0.iter().map(|fall| (fall.covariances.trace, fall.of((fall.uu, fall.apa)))))
+    }
+
+    fn after(&mut self, i: usize, delta: f64) -> f64 {
+        worth(self.0.iter().map(|fall| (fall.covariances.trace, fall.of(fall.parts(i, delta)))))
+    }
+
+    fn change(&mut self, i: usize, delta: f64) {
+        self.0.iter_mut().for_each(|fall| fall.change(i, delta));
+    }
+}
+
+/// |P a|² / (aᵀP a + σ²) of one kind.
 struct Fall<'a> {
     covariances: &'a Covariances,
     /// P a
@@ -142,21 +192,11 @@ impl<'a> Fall<'a> {
     fn of(&self, (uu, apa): (f64, f64)) -> f64 {
         uu / (apa.max(0.0) + self.covariances.variance)
     }
-}
 
-impl Worth for Fall<'_> {
     fn start(&mut self, row: &[f64]) {
         adjoint(&self.covariances.posterior.covariance, row, &mut self.u);
         adjoint(&self.covariances.square, row, &mut self.w);
         (self.uu, self.apa) = (dot(&self.u, &self.u), dot(row, &self.u));
-    }
-
-    fn worth(&self) -> f64 {
-        self.of((self.uu, self.apa))
-    }
-
-    fn after(&mut self, i: usize, delta: f64) -> f64 {
-        self.of(self.parts(i, delta))
     }
 
     fn change(&mut self, i: usize, delta: f64) {
@@ -286,15 +326,17 @@ struct Covariances {
     posterior: GaussianPosterior,
     /// P², N × N.
     square: Vec<f64>,
+    /// tr P.
+    trace: Trace,
     /// σ².
     variance: f64,
     w: Vec<f64>,
 }
 
 impl Covariances {
-    /// Before any measurement: P = `covariance`.
-    fn new(covariance: Matrix, variance: f64) -> Self {
-        let n = covariance.nrows();
+    /// Before any measurement of the images `of`: P is their covariance.
+    fn new(task: &RowTask<'_>, of: &Expected) -> Self {
+        let (n, covariance) = (of.taxels(), of.covariance());
         let p = covariance.view().values().to_vec();
         let mut square = vec![0.0; n * n];
         // P is symmetric: (P²)ᵢⱼ is the product of two rows
@@ -302,7 +344,8 @@ impl Covariances {
             let row = &p[i * n..(i + 1) * n];
             out.iter_mut().zip(p.chunks_exact(n)).for_each(|(out, other)| *out = dot(row, other));
         });
-        Self { n, posterior: GaussianPosterior::new(p, n), square, variance, w: vec![0.0; n] }
+        let (trace, variance) = (Trace::new(of.variance()), task.variance(of));
+        Self { n, posterior: GaussianPosterior::new(p, n), square, trace, variance, w: vec![0.0; n] }
     }
 
     /// Measures the row `a`.
@@ -317,6 +360,7 @@ impl Covariances {
             axpy(-u[i] / d, w, square);
         });
         self.posterior.lower(d);
+        self.trace.lower(self.posterior.variances().sum());
     }
 }
 
@@ -342,13 +386,13 @@ pub fn posterior_trace(task: &RowTask<'_>, rows: &Matrix) -> Result<f64, Refusal
     let mut system = DMatrix::from_fn(m, m, |i, j| if i < j { 0.0 } else { dot(row(i), rows.row(j)) });
     // rounding of the sums is what a noise of this size is lost in
     let floor = f64::EPSILON * m as f64 * (0..m).map(|i| system[(i, i)]).fold(0.0, f64::max);
-    (0..m).for_each(|i| system[(i, i)] += task.variance().max(floor));
+    (0..m).for_each(|i| system[(i, i)] += task.variance(expected).max(floor));
     let before = expected.variance();
     // only the lower triangle is read
     let Some(factor) = system.cholesky() else {
-        let mut covariances = Covariances::new(expected.covariance(), task.variance());
+        let mut covariances = Covariances::new(task, expected);
         (0..m).for_each(|r| covariances.observe(rows.row(r)));
-        return Ok(covariances.posterior.variances().sum::<f64>() / before);
+        return Ok(covariances.trace.share(0.0));
     };
     // row by row
     let factor = factor.l().transpose();
@@ -376,8 +420,7 @@ pub fn posterior_trace(task: &RowTask<'_>, rows: &Matrix) -> Result<f64, Refusal
 mod tests {
     use super::*;
     use crate::recover::Gaussian;
-    use crate::rows::expected::{Expected, Tolerances};
-    use crate::rows::greedy::posterior_trace;
+    use crate::rows::expected::Tolerances;
 
     fn hadamard(n: usize, r: usize, c: usize) -> f64 {
         debug_assert!(n.is_power_of_two());
@@ -406,7 +449,7 @@ mod tests {
             assert!((overlap.abs() - n as f64).abs() < 1e-9, "row {r} is not eigenvector {k}: {overlap}");
         }
         // every row then removes its own variance but for the noise: λ → λ σ²/(N λ + σ²)
-        let (variance, all) = (task.variance(), variances.iter().sum::<f64>());
+        let (variance, all) = (task.variance(&expected), variances.iter().sum::<f64>());
         let left: f64 = order
             .iter()
             .enumerate()
@@ -440,7 +483,7 @@ mod tests {
         let c = expected.covariance();
         let dense = nalgebra::DMatrix::from_row_slice(64, 64, c.view().values());
         let eigen: Vec<f64> = dense.symmetric_eigenvalues().iter().map(|v| v.max(0.0)).collect();
-        let bound = water_filling(&eigen, 12.0 * 64.0 / task.variance()) / 64.0;
+        let bound = water_filling(&eigen, 12.0 * 64.0 / task.variance(&expected)) / 64.0;
         let left = posterior_trace(&task, &rows).unwrap();
         assert!(left >= bound, "{left} below the bound {bound}");
         assert!(1.0 - left > 0.8 * (1.0 - bound), "{left}, bound {bound}");
@@ -453,9 +496,9 @@ mod tests {
         let task = RowTask::new(6, &expected);
         let a = DMatrix::from_fn(6, 20, |i, j| if (i * 7 + j * j + i * j) % 3 == 0 { -1.0 } else { 1.0 });
         let c = DMatrix::from_row_slice(20, 20, expected.covariance().view().values());
-        let system = &a * &c * a.transpose() + DMatrix::identity(6, 6) * task.variance();
+        let system = &a * &c * a.transpose() + DMatrix::identity(6, 6) * task.variance(&expected);
         let left = &c - &c * a.transpose() * system.try_inverse().unwrap() * &a * &c;
-        let mut covariances = Covariances::new(expected.covariance(), task.variance());
+        let mut covariances = Covariances::new(&task, &expected);
         let rows = Matrix::from_rows(6, 20, a.transpose().as_slice().to_vec()).unwrap();
         (0..6).for_each(|r| covariances.observe(rows.row(r)));
         let squared = &left * &left;

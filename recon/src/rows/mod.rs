@@ -23,6 +23,7 @@ mod classes;
 mod conformance;
 mod expected;
 mod greedy;
+mod kinds;
 mod simple;
 
 pub use classes::{Classes, choose_for_classes, choose_for_images};
@@ -44,10 +45,15 @@ pub struct RowTask<'a> {
     pub rows: usize,
     /// Expected images.
     pub expected: &'a Expected,
+    /// Kinds of these images, each with second moments of its own. With any, `greedy` and [`choose_for_images`] take
+    /// the row that most lowers the largest share of a kind's variance that is left, made smooth: Σₖ (tr Pₖ / tr Cₖ)⁴
+    /// after the row, with the prior and posterior covariances Cₖ and Pₖ. Empty: the row that most lowers tr P of
+    /// `expected`. The limit of the sums is that of `expected`. All other designers refuse kinds.
+    pub kinds: &'a [Expected],
     /// Gaussian classes, for designers that distinguish classes; empty for all others.
     pub classes: &'a [Component],
-    /// Standard deviation of a measurement's noise relative to the root mean square of a random row's sum, in [1e-6,
-    /// 1e3].
+    /// Standard deviation of a measurement's noise relative to the root mean square of a random row's sum over the
+    /// images or the kind, in [1e-6, 1e3].
     pub noise: f64,
     /// Headroom: largest root mean square of a row's sum over the expected images, relative to a random row's, in
     /// [0.05, 1000]. `None` for no limit.
@@ -85,7 +91,16 @@ impl<'a> RowTask<'a> {
 
     /// A task for `rows` rows and the images `expected`, without a limit of the sums.
     pub fn new(rows: usize, expected: &'a Expected) -> Self {
-        Self { rows, expected, classes: &[], noise: Self::NOISE, largest_sum: None, seed: 1, row_found: &|| () }
+        Self {
+            rows,
+            expected,
+            kinds: &[],
+            classes: &[],
+            noise: Self::NOISE,
+            largest_sum: None,
+            seed: 1,
+            row_found: &|| (),
+        }
     }
 
     /// Checks all numbers; at most `most` rows, because of `reason`.
@@ -97,12 +112,30 @@ impl<'a> RowTask<'a> {
         if self.rows == 0 || self.rows > most {
             return Err(too_many_rows(self.rows, most, reason));
         }
-        Ok(())
+        let [rows, cols] = self.expected.shape();
+        let other = self.kinds.iter().find(|kind| kind.shape() != [rows, cols]);
+        other.map_or(Ok(()), |kind| Err(other_grid(kind.taxels(), rows, cols).at("kinds")))
     }
 
-    /// σ²: variance of a measurement's noise, in the unit of the images.
-    pub(super) fn variance(&self) -> f64 {
-        self.noise * self.noise * self.expected.random_square()
+    /// As [`Self::check`], for what knows no kinds, called `name`.
+    pub(super) fn check_without_kinds(&self, name: &str, most: usize, reason: &'static str) -> Result<(), Refusal> {
+        if !self.kinds.is_empty() {
+            return Err(Refusal::new(format!(
+                "`kinds` has {}; valid for {name}: none; only `greedy` and the choice for images weigh kinds",
+                self.kinds.len()
+            )));
+        }
+        self.check(most, reason)
+    }
+
+    /// The Gaussians whose variance rows are to lower: the kinds, or the expected images alone.
+    pub(super) fn gaussians(&self) -> &'a [Expected] {
+        if self.kinds.is_empty() { std::slice::from_ref(self.expected) } else { self.kinds }
+    }
+
+    /// σ²: variance of a measurement's noise for the images `of`, in their unit.
+    pub(super) fn variance(&self, of: &Expected) -> f64 {
+        self.noise * self.noise * of.random_square()
     }
 
     /// The largest mean square of a row's sum, in the unit of the images.

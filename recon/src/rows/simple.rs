@@ -17,7 +17,7 @@ const DRAWS: usize = 1000;
 
 impl DesignRows for Random {
     fn design(&self, task: &RowTask<'_>) -> Result<Matrix, Refusal> {
-        task.check(1 << 20, "so many rows are of no use")?;
+        task.check_without_kinds("random", 1 << 20, "so many rows are of no use")?;
         let n = task.expected.taxels();
         let mut rng = ChaCha8Rng::seed_from_u64(task.seed);
         if task.largest_sum.is_none() {
@@ -44,7 +44,7 @@ impl DesignRows for CosineSigns {
     fn design(&self, task: &RowTask<'_>) -> Result<Matrix, Refusal> {
         let shape = task.expected.shape();
         let reason = "a sheet has as many cosines as taxels, and some of them may not keep to the headroom";
-        task.check(task.expected.taxels(), reason)?;
+        task.check_without_kinds("cosine_signs", task.expected.taxels(), reason)?;
         let axes = shape.map(|n| (0..n).map(|u| (0..n).map(|i| sign(n, u, i)).collect()).collect());
         take(task, products(shape, &axes, by_frequency(shape)), reason)
     }
@@ -89,7 +89,7 @@ impl DesignRows for Separable {
     fn design(&self, task: &RowTask<'_>) -> Result<Matrix, Refusal> {
         let shape = task.expected.shape();
         let reason = "a sheet has as many products of rows as taxels, and some of them may not keep to the headroom";
-        task.check(task.expected.taxels(), reason)?;
+        task.check_without_kinds("separable", task.expected.taxels(), reason)?;
         let mut rows: [Vec<Vec<f64>>; 2] = Default::default();
         let mut worth: [Vec<f64>; 2] = Default::default();
         for (axis, covariance) in task.expected.axes().into_iter().enumerate() {

@@ -106,6 +106,7 @@ fn chosen(sensing: Sensing) -> &'static str {
     match sensing {
         Sensing::Random => "",
         Sensing::Chosen => ", chosen rows",
+        Sensing::WorstKind => ", rows chosen for the worst kind",
     }
 }
 

@@ -62,8 +62,8 @@ struct Prepared {
     /// Name of the source, and the scored object.
     key: (String, Option<(String, bool)>),
     data: TrainingData,
-    /// Chooses rows for this training data; built on request.
-    chooser: Option<Arc<RowChooser>>,
+    /// Choose rows for this training data, for the mean of its images and for the worst kind; built on request.
+    choosers: [Option<Arc<RowChooser>>; 2],
 }
 
 /// Trains decoders, each with the training data that it needs; every set of training data is prepared once.
@@ -153,8 +153,9 @@ impl<'a> Trainer<'a> {
                     for &sensing in &asked.sensing {
                         let choosers = match sensing {
                             Sensing::Random => Vec::new(),
-                            Sensing::Chosen => {
-                                let each = places.iter().map(|&(place, _)| self.chooser(place));
+                            Sensing::Chosen | Sensing::WorstKind => {
+                                let worst_kind = sensing == Sensing::WorstKind;
+                                let each = places.iter().map(|&(place, _)| self.chooser(place, worst_kind));
                                 each.collect::<Result<_, Refusal>>()?
                             }
                         };
@@ -228,13 +229,14 @@ impl<'a> Trainer<'a> {
     }
 
     /// What chooses rows for the set at this place, built once.
-    fn chooser(&mut self, place: usize) -> Result<Arc<RowChooser>, Refusal> {
-        let prepared = &mut self.prepared[place];
-        let chooser = match &prepared.chooser {
+    fn chooser(&mut self, place: usize, worst_kind: bool) -> Result<Arc<RowChooser>, Refusal> {
+        let Prepared { data, choosers, .. } = &mut self.prepared[place];
+        let built = &mut choosers[usize::from(worst_kind)];
+        let chooser = match built {
             Some(chooser) => Arc::clone(chooser),
-            None => Arc::new(RowChooser::new(&prepared.data)?),
+            None => Arc::new(RowChooser::new(data, worst_kind)?),
         };
-        prepared.chooser = Some(Arc::clone(&chooser));
+        *built = Some(Arc::clone(&chooser));
         Ok(chooser)
     }
 
@@ -252,7 +254,7 @@ impl<'a> Trainer<'a> {
         if let (true, Some(given)) = (published, &self.source.published) {
             data = data.with_published(&given.dictionary, &given.library);
         }
-        self.prepared.push(Prepared { key, data, chooser: None });
+        self.prepared.push(Prepared { key, data, choosers: [None, None] });
         Ok(self.prepared.len() - 1)
     }
 

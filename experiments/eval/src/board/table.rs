@@ -125,7 +125,7 @@ pub fn table(board: &ScoreBoard) -> String {
         out.push_str("look-up: the answer is an image of a learned class, the scored object among them; it says nothing of other objects\n");
     }
     out.push_str("classes: share correct of single windows, of votes of 20, of evidence added over 20; support counts every taxel, so that an empty image is right about all that is not touched\n");
-    if board.rows.iter().any(|r| r.key.sensing == Sensing::Chosen) {
+    if board.rows.iter().any(|r| r.key.sensing != Sensing::Random) {
         out.push_str("chosen rows: picked from those of a press for what was learned, before a sample is seen; their order in time is lost, and there are no votes\n");
     }
     if !board.localisation.is_empty() {

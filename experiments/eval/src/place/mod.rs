@@ -189,7 +189,9 @@ impl<'a> PlacesRequest<'a> {
         for sensing in self.sensing {
             let presses = match sensing {
                 Sensing::Random => vec![press.clone()],
-                Sensing::Chosen => chosen_places(&press, tools.shape, most)?,
+                Sensing::Chosen | Sensing::WorstKind => {
+                    chosen_places(&press, tools.shape, most, *sensing == Sensing::WorstKind)?
+                }
             };
             for spec in &self.locators {
                 let mut locators: Vec<_> = presses.iter().map(|press| (spec.start)(tools, press)).collect();
@@ -197,7 +199,7 @@ impl<'a> PlacesRequest<'a> {
                     let mut errors = Vec::new();
                     for (press, locator) in presses.iter().zip(&mut locators) {
                         // of chosen rows, the first are the choice for any M
-                        let end = if *sensing == Sensing::Chosen { m } else { press.len() };
+                        let end = if *sensing == Sensing::Random { press.len() } else { m };
                         // a window that a locator fails on counts as a guess, so that all are compared on the same ones
                         let places = press
                             .windows(0..end, m, m)

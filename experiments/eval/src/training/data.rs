@@ -12,7 +12,9 @@ use spts_models::{SkinLayout, Streams, TaxelGains, fits_memory};
 use spts_recon::classify::{Library, Src};
 use spts_recon::dictionary::{Ksvd, Selection, select, shifted};
 use spts_recon::recover::{Gaussian, ImagePrior, Unrolled};
+use spts_recon::rows::{Expected, Tolerances};
 use spts_recon::{Matrix, MatrixView, SignTables};
+use std::collections::BTreeMap;
 use std::ops::Range;
 use std::sync::{Arc, OnceLock};
 
@@ -56,6 +58,8 @@ pub struct TrainingData {
     alike: Option<Arc<Matrix>>,
     /// Labels of these images, if they show named objects in many poses.
     posed: Option<Arc<Vec<usize>>>,
+    /// Kind of each of `images`: family of the shape, outline, object or class. Empty if nothing tells them apart.
+    kinds: Arc<[Arc<str>]>,
     /// The requested network; `None` for the one shipped with the program.
     network: Option<TrainedNetwork>,
     candidates: Arc<Vec<Vec<f64>>>,
@@ -79,8 +83,9 @@ impl TrainingData {
         gain_sd: Vec<f64>,
         streams: Streams,
     ) -> Result<Self, Refusal> {
-        let images = prior_images(training);
+        let (images, kinds) = prior_images(training);
         Ok(Self {
+            kinds: kinds.into(),
             templates: templates(training).map_err(|e| e.at("library"))?,
             gain_sd,
             candidates: Arc::new(training_images(training)),
@@ -100,6 +105,7 @@ impl TrainingData {
             bare: false,
             alike: None,
             posed: None,
+            kinds: Arc::default(),
             network: None,
             candidates: Arc::default(),
             streams,
@@ -149,6 +155,7 @@ impl TrainingData {
         });
         let means: Vec<Vec<f64>> = means.collect();
         Ok(Self {
+            kinds: labels.iter().map(|label| format!("class {label}").into()).collect(),
             templates: Library::new(&Matrix::from_column_slices(images.nrows(), &means), &classes)
                 .map_err(|e| e.at("library"))?,
             candidates: Arc::new(columns),
@@ -168,12 +175,13 @@ impl TrainingData {
             let library = Library::new(&one, &[0]).map_err(|e| e.at("library"))?;
             return Ok(Self { bare: true, ..Self::of_library(library, one, skin.cols(), streams) });
         }
-        let images = outline_images(skin, streams);
+        let (images, outlines) = outline_images(skin, streams);
         let mean: Vec<f64> = (0..images.nrows()).map(|r| images.row(r).iter().sum()).collect();
         let library =
             Library::new(&Matrix::from_column_slices(images.nrows(), &[&mean]), &[0]).map_err(|e| e.at("library"))?;
         Ok(Self {
             random_shapes: true,
+            kinds: outlines.into(),
             dictionary: OnceLock::from(Arc::new(Dictionary::new(blobs(skin)))),
             ..Self::of_library(library, images, skin.cols(), streams)
         })
@@ -189,10 +197,11 @@ impl TrainingData {
     pub fn for_shapes(skin: &SkinLayout, streams: Streams) -> Result<Self, Refusal> {
         let data = Self::for_layout(skin, streams)?;
         data.check_learned()?;
-        let Ok(shapes) = shape_images(skin, streams.rng("shapes", 0).random()) else { return Ok(data) };
+        let Ok((shapes, families)) = shape_images(skin, streams.rng("shapes", 0).random()) else { return Ok(data) };
         let columns = [&shapes, &data.images].into_iter().flat_map(|of| (0..of.ncols()).map(|k| of.column(k)));
         let alike = Matrix::from_column_slices(skin.taxels(), &columns.collect::<Vec<_>>());
-        Ok(Self { images: with_gains(&shapes, streams), alike: Some(Arc::new(alike)), ..data })
+        let images = with_gains(&shapes, streams);
+        Ok(Self { images, kinds: families.into(), alike: Some(Arc::new(alike)), ..data })
     }
 
     /// Training data from `objects`, each with its label, in all their poses, for a sheet with `cols` columns and
@@ -201,10 +210,11 @@ impl TrainingData {
     /// # Errors
     /// As [`Self::of_images`].
     pub(crate) fn of_poses(objects: &[(usize, &PosedObject)], cols: usize, streams: Streams) -> Result<Self, Refusal> {
-        let (mut columns, mut labels) = (Vec::new(), Vec::new());
+        let (mut columns, mut labels, mut kinds) = (Vec::new(), Vec::new(), Vec::new());
         for (label, object) in objects {
             columns.extend((0..object.images.ncols()).map(|k| object.images.column(k)));
             labels.resize(columns.len(), *label);
+            kinds.resize(columns.len(), Arc::from(object.name));
         }
         let matrix = |columns: &[Vec<f64>]| Matrix::from_column_slices(columns.first().map_or(0, Vec::len), columns);
         let alike = matrix(&columns);
@@ -214,7 +224,8 @@ impl TrainingData {
         let of_library: Vec<Vec<f64>> = few.iter().map(|&k| images.column(k)).collect();
         let few_labels: Vec<usize> = few.iter().map(|&k| labels[k]).collect();
         let data = Self::of_images(matrix(&of_library), &few_labels, cols, streams)?;
-        Ok(Self { images, alike: Some(Arc::new(alike)), posed: Some(Arc::new(labels)), ..data })
+        let (alike, posed) = (Some(Arc::new(alike)), Some(Arc::new(labels)));
+        Ok(Self { images, alike, posed, kinds: kinds.into(), ..data })
     }
 
     /// Images of objects in many poses with equal gains of all taxels, and their labels; `None` if the poses are known.
@@ -302,6 +313,14 @@ impl TrainingData {
         fits_memory(&format!("{what} of {taxels} × {taxels} taxels"), 8.0 * matrices * (taxels as f64).powi(2))
     }
 
+    /// How images are cleaned and shifted that are to be as `how` says: random shapes are used as they are.
+    fn how(&self, how: ImagePrior) -> ImagePrior {
+        if self.random_shapes {
+            return ImagePrior { reach: 0, stay: 1.0, threshold: 0.0, ..ImagePrior::UNSEEN };
+        }
+        how
+    }
+
     /// A prior of the images, cleaned and shifted as `how` says.
     ///
     /// # Errors
@@ -309,13 +328,57 @@ impl TrainingData {
     pub fn prior(&self, how: ImagePrior) -> Result<Arc<Gaussian>, Refusal> {
         self.check_learned()?;
         self.fits_squares("a prior", PRIOR_SQUARES)?;
-        let how = if self.random_shapes {
-            ImagePrior { reach: 0, stay: 1.0, threshold: 0.0, ..ImagePrior::UNSEEN }
-        } else {
-            how
-        };
+        let how = self.how(how);
         Ok(Arc::new(how.learn(&self.images, self.shape[1]).map_err(|e| e.at("prior"))?))
     }
+
+    /// What rows are designed or chosen for: the images of [`Self::prior`] with `tolerances`, and, if the worst kind is
+    /// to count and not the mean (`worst_kind`), every kind of them by its name, in alphabetical order. A kind is what
+    /// the training data tells apart: a family of the procedural shapes, an outline, an object, or a class of images.
+    /// The moments of its own images are drawn towards those of all ([`Expected::drawn_towards`]).
+    ///
+    /// # Errors
+    /// As [`Self::prior`]; [`Refusal`] for tolerances out of range, and with `worst_kind` for fewer than two kinds.
+    pub fn expected(
+        &self,
+        how: ImagePrior,
+        tolerances: Tolerances,
+        worst_kind: bool,
+    ) -> Result<(Expected, Kinds), Refusal> {
+        let expected = |prior: &Gaussian| Expected::like(prior, self.shape, tolerances).map_err(|e| e.at("rows"));
+        let all = expected(&*self.prior(how)?)?;
+        if !worst_kind {
+            return Ok((all, Kinds::default()));
+        }
+        let mut columns: BTreeMap<&str, Vec<Vec<f64>>> = BTreeMap::new();
+        for (k, kind) in self.kinds.iter().enumerate() {
+            columns.entry(kind).or_default().push(self.images.column(k));
+        }
+        if columns.len() < 2 {
+            return Err(Refusal::new(format!(
+                "`--worst-kind`: the images to learn from have {} kind; valid: at least 2, such as families of shapes                  or objects",
+                columns.len()
+            )));
+        }
+        self.fits_squares("priors of all kinds", PRIOR_SQUARES * columns.len() as f64)?;
+        let mut kinds = Kinds::default();
+        for (name, columns) in columns {
+            let images = Matrix::from_column_slices(self.images.nrows(), &columns);
+            let own = self.how(how).learn(&images, self.shape[1]).map_err(|e| e.at(format!("kind {name}")))?;
+            kinds.expected.push(expected(&own)?.drawn_towards(&all, columns.len())?);
+            kinds.names.push(name.to_owned());
+        }
+        Ok((all, kinds))
+    }
+}
+
+/// Kinds of images, by [`TrainingData::expected`]; empty where the mean of all images counts.
+#[derive(Debug, Clone, Default)]
+pub struct Kinds {
+    /// Names.
+    pub names: Vec<String>,
+    /// Second moments of each kind.
+    pub expected: Vec<Expected>,
 }
 
 /// Reach of the shifted dictionary if none is published, taxels.

@@ -8,7 +8,7 @@ mod shapes;
 #[cfg(feature = "mujoco")]
 mod skins;
 
-pub use data::{Dictionary, Learned, Learning, SHIFT_REACH, TrainingData};
+pub use data::{Dictionary, Kinds, Learned, Learning, SHIFT_REACH, TrainingData};
 pub use gains::{BAND_SD, GainCheck, SkinGains, gain_sds, on_skins_with, simulated_gain_sd};
 pub use network::TrainedNetwork;
 pub use presses::{TrainingPresses, library, prior_images, templates, training_images};

@@ -7,6 +7,7 @@ use spts_input::Refusal;
 use spts_recon::Matrix;
 use spts_recon::classify::Library;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Frames of a press that dictionary learning looks at: the rise, the plateau and the lift.
 const TRAINING_FRAMES: Range<usize> = 250..800;
@@ -23,6 +24,8 @@ const PRIOR_FRAMES: [usize; 3] = [520, 580, 640];
 #[derive(Debug, Clone)]
 pub struct TrainingPresses<'a> {
     label: usize,
+    /// Name of the object.
+    object: &'a str,
     raster: &'a Recording,
     /// Frames of the hold of this recording; in the published recordings it begins with [`PLATEAU`].
     hold: Range<usize>,
@@ -37,6 +40,7 @@ impl<'a> TrainingPresses<'a> {
         let first = session.raster_protocol.first_frame;
         Some(Self {
             label: session.label,
+            object: &session.object,
             raster,
             hold: first..first + session.raster_protocol.frames,
             presses: (presses.start.min(end)..end).collect(),
@@ -153,15 +157,17 @@ fn class_library(
 }
 
 /// Images that a decoder's prior is learned from, taxels × images, V: three raster images of every press, from early,
-/// middle and late in the hold.
-pub fn prior_images(training: &[TrainingPresses<'_>]) -> Matrix {
+/// middle and late in the hold; and the object of each image.
+pub fn prior_images(training: &[TrainingPresses<'_>]) -> (Matrix, Vec<Arc<str>>) {
     let mut columns: Vec<&[f64]> = Vec::new();
+    let mut objects = Vec::new();
     for t in training {
         for &press in &t.presses {
             columns.extend(PRIOR_FRAMES.iter().map(|&frame| t.image(press, frame)));
         }
+        objects.resize(columns.len(), Arc::from(t.object));
     }
-    Matrix::from_column_slices(taxels(training), &columns)
+    (Matrix::from_column_slices(taxels(training), &columns), objects)
 }
 
 fn taxels(training: &[TrainingPresses<'_>]) -> usize {

@@ -10,6 +10,7 @@ use spts_input::Refusal;
 use spts_models::{SkinLayout, Streams, VelostatConfig};
 use spts_recon::Matrix;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// The data set of these shapes.
 pub const SHAPES_SPEC: &str = "unseen-shapes";
@@ -26,11 +27,12 @@ const CHUNK: u64 = 50;
 
 /// Images of a skin of this `layout` (taxels × images) under the shapes of [`SHAPES_SPEC`], with equal gains of all
 /// taxels, each scaled to a maximum of 1. A press gives all the images that the symmetries of the sheet make of it:
-/// they are what the mirrored and turned shape would have given. The result depends only on the layout and `seed`.
+/// they are what the mirrored and turned shape would have given. With the images comes the family of each one's shape.
+/// The result depends only on the layout and `seed`.
 ///
 /// # Errors
 /// [`Refusal`] if the layout is too large, or too small for the shapes to touch it.
-pub fn shape_images(layout: &SkinLayout, seed: u64) -> Result<Matrix, Refusal> {
+pub fn shape_images(layout: &SkinLayout, seed: u64) -> Result<(Matrix, Vec<Arc<str>>), Refusal> {
     let images = (VALUES / layout.taxels().max(1) as u64).clamp(FEWEST, IMAGES);
     let symmetries = symmetries(layout.rows(), layout.cols());
     let presses = images.div_ceil(symmetries.len() as u64);
@@ -57,10 +59,11 @@ pub fn shape_images(layout: &SkinLayout, seed: u64) -> Result<Matrix, Refusal> {
     if (pressed.len() as u64) < presses / LEAST_PRESSED {
         return Err(Refusal::new(format!("{} of {presses} shapes touch the skin: it is too small", pressed.len())));
     }
-    let columns = pressed.iter().flat_map(|image| {
+    let columns = pressed.iter().flat_map(|(image, _)| {
         symmetries.iter().map(move |taxels| taxels.iter().map(|&taxel| image[taxel]).collect::<Vec<_>>())
     });
-    Ok(Matrix::from_column_slices(layout.taxels(), &columns.collect::<Vec<_>>()))
+    let families = pressed.iter().flat_map(|(_, family)| symmetries.iter().map(move |_| Arc::clone(family)));
+    Ok((Matrix::from_column_slices(layout.taxels(), &columns.collect::<Vec<_>>()), families.collect()))
 }
 
 /// The symmetries of a sheet of `rows` × `cols` taxels: for each of them, the taxel whose value every taxel takes. A
@@ -87,15 +90,15 @@ fn symmetries(rows: usize, cols: usize) -> Vec<Vec<usize>> {
 /// Conductances of `rows` of a data set, each as a share of its largest.
 fn conductances(spec: &Spec, rows: Range<u64>) -> Result<Vec<Vec<f64>>, Refusal> {
     let mut maker = Maker::new(spec);
-    rows.map(|row| scaled(&mut maker, row)).collect()
+    rows.map(|row| scaled(&mut maker, row).map(|(image, _)| image)).collect()
 }
 
-/// Conductances of row `row` as a share of their largest.
-fn scaled(maker: &mut Maker<'_>, row: u64) -> Result<Vec<f64>, Refusal> {
+/// Conductances of row `row` as a share of their largest, and the name of what is pressed.
+fn scaled(maker: &mut Maker<'_>, row: u64) -> Result<(Vec<f64>, Arc<str>), Refusal> {
     let made = maker.row(row)?;
     let image = made.conductance().values();
     let peak = image.iter().copied().fold(f64::MIN_POSITIVE, f64::max);
-    Ok(image.iter().map(|v| v / peak).collect())
+    Ok((image.iter().map(|v| v / peak).collect(), made.name()))
 }
 
 /// How accurately the pose of an object is known: its place to half a taxel and its rotation to 15°, as read by eye;
@@ -202,33 +205,31 @@ const REACH: f64 = 3.0;
 /// Outline of a shape about its centre, in its own axes, for half sizes (a, b).
 type Inside = fn(x: f64, y: f64, a: f64, b: f64) -> bool;
 
-/// The outlines.
-const OUTLINES: [Inside; 5] = [
-    // ellipse
-    |x, y, a, b| (x / a).powi(2) + (y / b).powi(2) <= 1.0,
-    // plate
-    |x, y, a, b| x.abs() <= a && y.abs() <= b,
-    // ring
-    |x, y, a, b| {
+/// The outlines and their names.
+const OUTLINES: [(&str, Inside); 5] = [
+    ("ellipse", |x, y, a, b| (x / a).powi(2) + (y / b).powi(2) <= 1.0),
+    ("plate", |x, y, a, b| x.abs() <= a && y.abs() <= b),
+    ("ring", |x, y, a, b| {
         let r = ((x / a).powi(2) + (y / b).powi(2)).sqrt();
         (0.55..=1.0).contains(&r)
-    },
-    // cross
-    |x, y, a, b| (x.abs() <= a && y.abs() <= 0.3 * b) || (y.abs() <= b && x.abs() <= 0.3 * a),
-    // angle
-    |x, y, a, b| x.abs() <= a && y.abs() <= b && (x < -0.3 * a || y < -0.3 * b),
+    }),
+    ("cross", |x, y, a, b| (x.abs() <= a && y.abs() <= 0.3 * b) || (y.abs() <= b && x.abs() <= 0.3 * a)),
+    ("angle", |x, y, a, b| x.abs() <= a && y.abs() <= b && (x < -0.3 * a || y < -0.3 * b)),
 ];
 
-/// Images of random shapes on a skin of this layout, taxels × images; a function of `streams` alone.
-pub(super) fn outline_images(layout: &SkinLayout, streams: Streams) -> Matrix {
+/// Images of random shapes on a skin of this layout, taxels × images, and the outline of each; a function of `streams`
+/// alone.
+pub(super) fn outline_images(layout: &SkinLayout, streams: Streams) -> (Matrix, Vec<Arc<str>>) {
     let gain_log_sd = VelostatConfig::default().spread_log_sd;
-    let images: Vec<Vec<f64>> =
-        (0..SHAPES as u64).map(|index| image(layout, gain_log_sd, &mut streams.rng("layout/shape", index))).collect();
-    Matrix::from_column_slices(layout.taxels(), &images)
+    let names = OUTLINES.map(|(name, _)| Arc::from(name));
+    let each = (0..SHAPES as u64).map(|index| image(layout, gain_log_sd, &mut streams.rng("layout/shape", index)));
+    let (images, outlines): (Vec<_>, Vec<_>) = each.map(|(image, k)| (image, Arc::clone(&names[k]))).unzip();
+    (Matrix::from_column_slices(layout.taxels(), &images), outlines)
 }
 
-/// One shape, on taxels whose gains have logarithms with the standard deviation `gain_log_sd`.
-fn image(layout: &SkinLayout, gain_log_sd: f64, rng: &mut ChaCha8Rng) -> Vec<f64> {
+/// One shape, on taxels whose gains have logarithms with the standard deviation `gain_log_sd`, and its outline's place
+/// in [`OUTLINES`].
+fn image(layout: &SkinLayout, gain_log_sd: f64, rng: &mut ChaCha8Rng) -> (Vec<f64>, usize) {
     let (rows, cols) = (layout.rows(), layout.cols());
     // shapes that are wider than a strip still cover a length of it
     let side = ((rows * cols) as f64).sqrt().max(2.0);
@@ -238,7 +239,8 @@ fn image(layout: &SkinLayout, gain_log_sd: f64, rng: &mut ChaCha8Rng) -> Vec<f64
     let centre = [uniform(-0.5, rows as f64 - 0.5), uniform(-0.5, cols as f64 - 0.5)];
     let (sin, cos) = uniform(0.0, std::f64::consts::TAU).sin_cos();
     #[expect(clippy::cast_possible_truncation, reason = "a small positive number")]
-    let outline = OUTLINES[uniform(0.0, OUTLINES.len() as f64) as usize % OUTLINES.len()];
+    let kind = uniform(0.0, OUTLINES.len() as f64) as usize % OUTLINES.len();
+    let (_, outline) = OUTLINES[kind];
     let mut image = Vec::with_capacity(rows * cols);
     for row in 0..rows {
         for col in 0..cols {
@@ -254,7 +256,7 @@ fn image(layout: &SkinLayout, gain_log_sd: f64, rng: &mut ChaCha8Rng) -> Vec<f64
             image.push(covered / (SAMPLES * SAMPLES) as f64 * (gain_log_sd * normal).exp());
         }
     }
-    image
+    (image, kind)
 }
 
 /// The `images` (taxels × images) on taxels whose gains scatter as a skin's do, other ones in every image.
@@ -318,7 +320,8 @@ mod tests {
     fn shapes_cover_a_skin_of_any_layout() {
         for (rows, cols, pitch_m) in [(10, 10, 0.015), (6, 14, 0.01)] {
             let layout = SkinLayout::new(rows, cols, pitch_m, SkinLayout::usual_electrode_m(pitch_m)).unwrap();
-            let images = shape_images(&layout, 1).unwrap();
+            let (images, families) = shape_images(&layout, 1).unwrap();
+            assert_eq!(images.ncols(), families.len());
             assert_eq!(images.nrows(), rows * cols);
             let middle = images.row(rows / 2 * cols + cols / 2);
             let touched = middle.iter().filter(|g| **g > 0.0).count();
@@ -331,7 +334,7 @@ mod tests {
     fn any_layout_has_images_and_atoms() {
         for (rows, cols) in [(1, 64), (12, 20), (2, 1)] {
             let layout = SkinLayout::new(rows, cols, 5e-3, 3e-3).unwrap();
-            let images = outline_images(&layout, Streams::new(1));
+            let (images, _) = outline_images(&layout, Streams::new(1));
             assert_eq!((images.nrows(), images.ncols()), (rows * cols, SHAPES));
             for taxel in 0..rows * cols {
                 let touched = images.row(taxel).iter().filter(|v| **v > 0.1).count();
