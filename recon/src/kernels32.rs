@@ -396,6 +396,8 @@ pub(crate) fn explain(
         }
         first += count;
     }
+    spread[first..].fill(0.0);
+    height[first..].fill(0.0);
     let mut most = [0.0_f32; LANES];
     for (((spread, height), explained), share) in spread
         .as_chunks_mut::<LANES>()
