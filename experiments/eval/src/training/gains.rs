@@ -259,8 +259,8 @@ struct MixedModel {
     sessions: usize,
 }
 
-/// Smallest standard deviation of a mounting, which keeps the inverse finite.
-const SMALLEST: f64 = 1e-3;
+/// Smallest standard deviation of an effect, which keeps the inverse finite, and of the slopes, which stand apart.
+const SMALLEST: [f64; 2] = [1e-3, 1e-6];
 
 impl MixedModel {
     /// The model of `ratios` on `taxels` taxels; every session from 0 to `sessions` has one at least.
@@ -274,8 +274,8 @@ impl MixedModel {
         // a level and two slopes of every session
         let s = 3 * self.sessions;
         let Mounting { log_sd, tilt_log_sd } = effects.mounting;
-        let [prior, contact, mounting, tilt] =
-            [effects.gain, effects.contact, log_sd, tilt_log_sd].map(|sd| sd.max(SMALLEST).powi(2));
+        let [prior, contact, mounting] = [effects.gain, effects.contact, log_sd].map(|sd| sd.max(SMALLEST[0]).powi(2));
+        let tilt = tilt_log_sd.max(SMALLEST[1]).powi(2);
         let (mut h, mut b) = (DMatrix::zeros(s, s), DVector::zeros(s));
         // of every taxel: its own precision and right side, and its coupling with the sessions
         let mut own = vec![(1.0 / prior, 0.0); self.taxels];
