@@ -14,7 +14,8 @@ use spts_input::Refusal;
 /// use spts_models::{Mounting, SkinLayout, Streams, TaxelGains, Velostat, VelostatConfig};
 ///
 /// let skin = SkinLayout::new(1, 2, 0.015, 0.010)?;
-/// let gains = TaxelGains { shape: None, log_mean: vec![0.3, -0.3], log_sd: vec![0.0, 0.0], mounting: Mounting::default() };
+/// let (log_mean, log_sd) = (vec![0.3, -0.3], vec![0.0, 0.0]);
+/// let gains = TaxelGains { shape: None, log_mean, log_sd, mounting: Mounting::default() };
 /// let config = VelostatConfig { gains: Some(gains), ..VelostatConfig::default() };
 /// let sheet = Velostat::new(config, &skin, Streams::new(1))?;
 /// let of_taxels: Vec<f64> = sheet.gains().collect();
@@ -61,8 +62,8 @@ impl Mounting {
         self.taxel_log_sd([(2.0_f64 / 3.0).sqrt(), 0.0])
     }
 
-    /// The factor of every taxel of `skin` in one session, exactly 1 without a spread, from standard normal numbers: one
-    /// for each of the two slopes, and one for each taxel.
+    /// The factor of every taxel of `skin` in one session, exactly 1 without a spread, from standard normal numbers:
+    /// one for each of the two slopes, and one for each taxel.
     pub fn factors(self, skin: &SkinLayout, slopes: [f64; 2], mut each: impl FnMut() -> f64) -> Vec<f64> {
         let [a, b] = slopes.map(|z| self.tilt_log_sd * z);
         let factor = |taxel| {

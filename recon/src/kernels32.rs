@@ -300,8 +300,9 @@ fn around_tile<const T: usize>(
 }
 
 /// For the lines `below` less `above`, which have `width` numbers for each sample, for all `sides` and for the places k
-/// from 0 to `cols` − side: |s|² over the samples, s being the numbers at k + side less those at k. Sides ascend and are
-/// shorter than [`LONG`], the first eight shorter than [`SHORT`]. `found` has whole lanes of `cols` places for each.
+/// from 0 to `cols` − side: |s|² over the samples, s being the numbers at k + side less those at k. Sides ascend and
+/// are shorter than [`LONG`], the first eight shorter than [`SHORT`]. `found` has whole lanes of `cols` places for
+/// each.
 /// `line` becomes the difference, and has [`LONG`] numbers more.
 #[multiversion(targets("x86_64+avx512f+fma", "x86_64+avx2+fma", "aarch64+neon"))]
 pub(crate) fn span_squares(
@@ -368,9 +369,9 @@ pub(crate) struct Side {
 }
 
 /// What the samples say of the rectangles between two rows: `out` becomes c + share |s|², infinite beyond the last one,
-/// then share max(s·y, 0) over that, the height, then height s·y `scale`, the part that it explains; each of them as long
-/// as `shares`, whole lanes. Their |s|² are what [`span_squares`] has `found`, their s·y differences of `along`, the sums
-/// of Φᵀy over the taxels to the left. The largest part is returned.
+/// then share max(s·y, 0) over that, the height, then height s·y `scale`, the part that it explains; each of them as
+/// long as `shares`, whole lanes. Their |s|² are what [`span_squares`] has `found`, their s·y differences of `along`,
+/// the sums of Φᵀy over the taxels to the left. The largest part is returned.
 #[multiversion(targets("x86_64+avx512f+fma", "x86_64+avx2+fma", "aarch64+neon"))]
 pub(crate) fn explain(
     found: &[f32],

@@ -25,8 +25,8 @@ pub fn write(scores: &ScoreBoard, out: OutputFolder) -> Result<(), Refusal> {
     })
 }
 
-/// Writes `anytime.json`, `anytime.csv`, `objects.csv` and the figures `anytime` and `reliability` into the folder `out`: all of them, or
-/// none.
+/// Writes `anytime.json`, `anytime.csv`, `objects.csv` and the figures `anytime` and `reliability` into the folder
+/// `out`: all of them, or none.
 ///
 /// # Errors
 /// [`Refusal`] when a file cannot be written.

@@ -47,9 +47,9 @@ pub struct VelostatConfig {
     /// to the logarithm of the taxels' gains, from the middle of the sheet to its edge. Range [0, 2]; default 0.20: see
     /// [`Mounting`]. Recorded in two sessions each of four objects: `spts calibrate --skin`.
     pub session_tilt_log_sd: f64,
-    /// Gains of a calibrated skin. They replace `spread_log_sd` and both of `session_…`; every seed then draws a skin that
-    /// the calibrated one may be. A scene or the specification of a data set may instead name a file written by `spts
-    /// calibrate --skin`. Default: none.
+    /// Gains of a calibrated skin. They replace `spread_log_sd` and both of `session_…`; every seed then draws a skin
+    /// that the calibrated one may be. A scene or the specification of a data set may instead name a file written by
+    /// `spts calibrate --skin`. Default: none.
     pub gains: Option<TaxelGains>,
     /// T, temperature of the sheet, °C. Range [-45, 65], the sheet's operating range; default 25, for which the law is
     /// given.

@@ -15,8 +15,8 @@ use spts_input::Refusal;
 ///
 /// where d is the distance of two taxels, u and v, from −1 to 1, are a taxel's place along the rows and the columns of
 /// the sheet, and γᵢ is 0 for images of the same skin. θ is the tilt between two mountings of the skin. Of the smooth
-/// part, the tilt and the gains' part only the `rank` largest eigenvectors are kept. The rest, the other independent parts and the noise of a
-/// measurement are treated as white (see [`Component`]).
+/// part, the tilt and the gains' part only the `rank` largest eigenvectors are kept. The rest, the other independent
+/// parts and the noise of a measurement are treated as white (see [`Component`]).
 ///
 /// ```
 /// use spts_recon::Matrix;
@@ -37,8 +37,8 @@ pub struct TemplateModel {
     /// γ: relative standard deviation of every taxel's gain compared with that in the images, one value a taxel in [0,
     /// 10]; empty for images of the same skin.
     pub gains: Vec<f64>,
-    /// θ: standard deviation of the slopes of a plane in the logarithm of the gains, from the middle of the sheet to its
-    /// edge, by which two mountings of the skin differ, [0, 10].
+    /// θ: standard deviation of the slopes of a plane in the logarithm of the gains, from the middle of the sheet to
+    /// its edge, by which two mountings of the skin differ, [0, 10].
     pub tilt: f64,
     /// Standard deviation of the noise of one measurement, relative to the image's maximum, [1e-6, 1e5].
     pub noise: f64,

@@ -245,8 +245,9 @@ struct Solution {
     log_likelihood: f64,
 }
 
-/// Ratios of sessions and taxels, r = a_s + p_s·u_i + q_s·v_i + l_i + c_oi + m_si with a_s of a flat density, p_s, q_s ~
-/// N(0, τ²), l_i ~ N(0, σ²), c_oi ~ N(0, σ_c²) shared by all sessions of an object, m_si ~ N(0, σₘ²), all independent.
+/// Ratios of sessions and taxels, r = a_s + p_s·u_i + q_s·v_i + l_i + c_oi + m_si with a_s of a flat density, p_s, q_s
+/// ~ N(0, τ²), l_i ~ N(0, σ²), c_oi ~ N(0, σ_c²) shared by all sessions of an object, m_si ~ N(0, σₘ²), all
+/// independent.
 ///
 /// Source: S. R. Searle, G. Casella and C. E. McCulloch, *Variance Components* (1992), chapters 6 and 7 (restricted
 /// likelihood, prediction of random effects). Given the effects, the ratios of an object on a taxel have the covariance
