@@ -356,7 +356,8 @@ impl TrainingData {
         }
         if columns.len() < 2 {
             return Err(Refusal::new(format!(
-                "`--worst-kind`: the images to learn from have {} kind; valid: at least 2, such as families of shapes                  or objects",
+                "`--worst-kind`: the images to learn from have {} kind; valid: at least 2, such as families of shapes or \
+                 objects",
                 columns.len()
             )));
         }
