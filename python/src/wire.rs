@@ -46,7 +46,8 @@ const SLICE: usize = 1 << 16;
 /// transducer : str
 ///     "velostat" or "linear".
 /// parameters : dict, optional
-///     Parameters of the transducer.
+///     Parameters of the transducer. A wire over a sequence of skins, or over some of the taxels, has no tilt of the
+///     mounting (`session_tilt_log_sd` = 0).
 /// faults : list of dict, optional
 ///     Faulty cells: `name`, `taxel` and the fault's own parameters.
 /// taxels : sequence of int, optional
@@ -140,9 +141,20 @@ impl Wire {
             };
             faults.iter().enumerate().map(one).collect::<PyResult<_>>()
         });
+        let mut parameters = parameters.map(|p| table("parameters", p)).transpose()?.unwrap_or_default();
+        if transducer == "velostat" && skins.iter().any(|part| part.taxels.is_some()) {
+            // the taxels are in a row here, which no mounting tilts as a sheet
+            let tilt = parameters.entry("session_tilt_log_sd").or_insert(0.0.into());
+            if tilt.as_float().or(tilt.as_integer().map(|k| k as f64)).is_some_and(|tilt| tilt != 0.0) {
+                bail!(
+                    "`parameters.session_tilt_log_sd` = {tilt}: the taxels of several skins, or some of one, are no \
+                     sheet that tilts; valid: 0"
+                );
+            }
+        }
         let config = ChainConfig {
             transducer: Some(transducer.to_owned()),
-            transducer_parameters: parameters.map(|p| table("parameters", p)).transpose()?.unwrap_or_default(),
+            transducer_parameters: parameters,
             readout: Some(readout.to_owned()),
             rows: rows_of(seeds, levels, rows)?,
             faults: faults.transpose()?.unwrap_or_default(),
