@@ -148,7 +148,7 @@ fn held(end_s: f64, map: &ConductanceMap) -> Segment<'_> {
 /// assert_eq!(press.at(9.0), map(2e-4), "held after the last map");
 /// # Ok::<(), spts_input::Refusal>(())
 /// ```
-#[derive(Debug, Clone)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct Interpolated {
     times_s: Vec<f64>,
     maps: Vec<ConductanceMap>,

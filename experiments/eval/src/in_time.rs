@@ -7,8 +7,9 @@
 //! longer window with as many samples as there are taxels. [`crate::board::TrainedBoard::in_time`] trains the decoders.
 //!
 //! The true support of a press is that of the least-squares image of the samples after the window, which no decoder has
-//! used; during the hold of a simulated press it is that of what the taxels conduct. The ground truth of a drop is the
-//! least-squares image of the whole contact, as for places; it includes the decoded samples.
+//! used. Of a simulated press it is that of what the taxels conduct: during the hold, and at every instant where the
+//! press was simulated just now (`spts score --twin`). The ground truth of a drop is the least-squares image of the
+//! whole contact, as for places; it includes the decoded samples.
 
 use crate::algorithm::DecodeError;
 use crate::board::{Entry, TrainedBoard, no_session};
@@ -28,7 +29,7 @@ use serde::{Deserialize, Serialize};
 use spts::Session;
 use spts::output::{OutputFolder, write_json};
 use spts::session::Event;
-use spts_circuit::Recording;
+use spts_circuit::{Interpolated, Recording};
 use spts_input::Refusal;
 use spts_recon::localise::{centre_of_mass, distance};
 use spts_recon::metrics::{SUPPORT_THRESHOLD, SupportScore};
@@ -326,9 +327,19 @@ fn press(session: &ScoredSession, block: usize) -> Option<FollowedContact> {
         let press = (end + len <= last).then(|| untouched.press(recording, block, end..end + len))?;
         Some(fitted(recording, &press)?.support)
     };
+    // what the taxels conduct at measurement `end` above the untouched skin
+    let course = session.courses.get(block).and_then(Option::as_ref);
+    let conducts = |course: &Interpolated, end: usize| {
+        let [now, before] = [end, 0].map(|sample| course.at(sample as f64 / rate_hz));
+        let above = now.values().iter().zip(before.values()).map(|(now, before)| now - before);
+        mask(&above.collect::<Vec<f64>>())
+    };
     let rises = PRESS_S.iter().filter_map(|&time_s| {
         let end = touch.start + samples(time_s, rate_hz);
-        let support = later(end, hold.start * per_frame)?;
+        let support = match course {
+            Some(course) => (end < hold.start * per_frame).then(|| conducts(course, end))?,
+            None => later(end, hold.start * per_frame)?,
+        };
         Some(ScoredMoment { at: Some(time_s), end: end - first, support, centre: None })
     });
     let mut moments: Vec<ScoredMoment> = rises.collect();

@@ -4,7 +4,7 @@ use crate::protocol::{Protocol, Truth};
 use crate::truth::{PressTruth, may_be_fitted};
 use spts::Session;
 use spts::session::Event;
-use spts_circuit::Recording;
+use spts_circuit::{Interpolated, Recording};
 
 /// Both recordings of an object, with the number of its class and the scored blocks and frames.
 #[derive(Debug, Clone)]
@@ -31,6 +31,8 @@ pub struct ScoredSession {
     pub held: bool,
     /// True image of every block of the compressive recording, if a simulation knows it.
     pub simulated: Vec<Option<Vec<f64>>>,
+    /// Conductances over the time of every block, if it was simulated just now.
+    pub courses: Vec<Option<Interpolated>>,
 }
 
 impl ScoredSession {
@@ -50,6 +52,7 @@ impl ScoredSession {
             protocol: protocol.or(raster_protocol).unwrap_or_default(),
             raster_protocol: raster_protocol.or(protocol).unwrap_or_default(),
             simulated: presses.iter().filter(|_| !touches).map(true_image).collect(),
+            courses: presses.iter().map(|facts| facts.course.clone()).collect(),
             raster: session.raster.map(|r| r.recording),
             compressive: session.compressive.map(|r| r.recording),
             name: session.name,

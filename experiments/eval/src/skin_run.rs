@@ -8,7 +8,7 @@ use spts::record::{PressFrames, Twin};
 use spts::scene::{PressConfig, Scene, SceneConfig, Task};
 use spts::session::Recorded;
 use spts::simulate::Request;
-use spts_circuit::Mode;
+use spts_circuit::{Interpolated, Mode};
 use spts_input::Refusal;
 use std::path::{Path, PathBuf};
 
@@ -35,6 +35,8 @@ pub struct SkinRunPresses {
     pub session: Session,
     /// The presses, scanned ones first.
     pub presses: Vec<PressFrames>,
+    /// Conductances over the time of the presses that are summed.
+    pub courses: Vec<Interpolated>,
 }
 
 impl SkinRun<'_> {
@@ -44,7 +46,7 @@ impl SkinRun<'_> {
     /// [`Refusal`] if the mechanics or the readout fail.
     pub fn record(&self, done: &(dyn Fn() + Sync)) -> Result<SkinRunPresses, Refusal> {
         let twin = Twin::new(self.scene)?;
-        let mut presses = twin.presses(0..self.scanned, done)?;
+        let (mut presses, mut courses) = (twin.presses(0..self.scanned, done)?, Vec::new());
         let scan = Acquisition::presses(Mode::Raster, 2 * self.number);
         let raster = Recorded {
             conditioning: self.conditioning.min(self.scanned.saturating_sub(1)),
@@ -56,13 +58,15 @@ impl SkinRun<'_> {
         };
         let compressive = if self.summed > 0 {
             let later = twin.presses(self.scanned..self.scanned + self.summed, done)?;
-            let compressive = twin.recorded(&later, &sums)?;
+            let mut conductance = twin.conductance(&later, &sums)?;
+            let compressive = twin.read_out(&later, &mut conductance, &sums)?;
+            courses.extend(conductance);
             presses.extend(later);
             Some(compressive)
         } else {
             None
         };
-        Ok(SkinRunPresses { session: twin.session(Some(raster), compressive), presses })
+        Ok(SkinRunPresses { session: twin.session(Some(raster), compressive), presses, courses })
     }
 }
 
@@ -130,8 +134,12 @@ impl TwinSessions {
         let sessions = scenes.par_iter().enumerate().map(|(number, (scene, name))| {
             let [scanned, summed] = self.presses(name);
             let run = SkinRun { scene, number: number as u64, scanned, summed, conditioning: scanned };
-            let recorded = run.record(done).map_err(|e| refused(name, e))?;
-            Ok(recorded.session)
+            let SkinRunPresses { mut session, courses, .. } = run.record(done).map_err(|e| refused(name, e))?;
+            let facts = session.compressive.iter_mut().flat_map(|compressive| &mut compressive.presses);
+            for (facts, course) in facts.zip(courses) {
+                facts.course = Some(course);
+            }
+            Ok(session)
         });
         Ok(twin_set(sessions.collect::<Result<_, Refusal>>()?))
     }

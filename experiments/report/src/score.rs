@@ -190,19 +190,22 @@ fn reliability(board: &AnytimeBoard) -> Vec<Chart> {
         let here = board.rows.iter().filter(|r| r.key.subject == subject && r.key.confidence.is_none());
         let keys = unique(here.clone().map(|r| (&*r.key.decoder, r.key.sensing, r.key.left_out, &*r.key.learned_from)));
         let mut points = Vec::new();
-        for key in keys {
-            let same = |r: &&&AnytimeRow| key == (&*r.key.decoder, r.key.sensing, r.key.left_out, &*r.key.learned_from);
+        for (at, key) in keys.iter().enumerate() {
+            let same =
+                |r: &&&AnytimeRow| *key == (&*r.key.decoder, r.key.sensing, r.key.left_out, &*r.key.learned_from);
             let own = here.clone().filter(|r| same(&r)).flat_map(|r| &r.reliability);
-            points.extend(Stated::tenths(own.copied()).into_iter().map(|tenth| (key, tenth)));
+            let stroke = Stroke::of(keys[..at].iter().filter(|other| other.0 == key.0).count());
+            points.extend(Stated::tenths(own.copied()).into_iter().map(|tenth| (*key, stroke, tenth)));
         }
-        let curve = move |((decoder, sensing, left_out, learned), _): ((&str, Sensing, bool, &str), Stated)| {
-            let whose = if left_out { "left out" } else { learned };
-            let stroke = Stroke::of(usize::from(sensing != Sensing::Random));
-            Curve::of_decoder(format!("{}, {} rows, {whose}", short_label(decoder), sensing.name()), decoder, stroke)
-        };
+        let curve =
+            |((decoder, sensing, left_out, learned), stroke, _): ((&str, Sensing, bool, &str), Stroke, Stated)| {
+                let whose = if left_out { "left out" } else { learned };
+                let name = format!("{}, {} rows, {whose}", short_label(decoder), sensing.name());
+                Curve::of_decoder(name, decoder, stroke)
+            };
         Plot::new(points)
-            .x("stated", |(_, tenth)| tenth.stated)
-            .y(y_label, |(_, tenth)| tenth.attained)
+            .x("stated", |(.., tenth)| tenth.stated)
+            .y(y_label, |(.., tenth)| tenth.attained)
             .within(0.0, 1.02)
             .by(curve)
             .chart(title)

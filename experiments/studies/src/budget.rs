@@ -567,6 +567,7 @@ impl<'a> LearnedSkin<'a> {
             raster_protocol: protocol,
             held: true,
             simulated: Vec::new(),
+            courses: Vec::new(),
         });
         let scanned: Vec<ScoredSession> = scanned.collect();
         let learned = (0..size.sessions).into_par_iter().map(|session| {

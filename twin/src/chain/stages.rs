@@ -574,6 +574,7 @@ pub fn press_facts(frames: &[Frame], maps: &[ConductanceMap], hold_s: Option<[f6
         force_n: Some(frame.wrench.force_n[2]),
         pressure: Some(frame.pressure.clone()),
         conductance: at.and_then(|at| maps.get(at)).cloned(),
+        course: None,
     }
 }
 

@@ -624,6 +624,7 @@ fn read_recorded(dir: &Path, path: &Path, mode: &'static str, contents: Recorded
             force_n: block.force_n,
             pressure: map_of(&pressure, k, taxels, info),
             conductance: map_of(&conductance, k, taxels, info),
+            course: None,
         });
     }
     if presses.iter().all(|facts| *facts == PressFacts::default()) {

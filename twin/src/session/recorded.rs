@@ -2,7 +2,7 @@
 
 use crate::provenance::Provenance;
 use serde::{Deserialize, Serialize};
-use spts_circuit::{Mode, Recording};
+use spts_circuit::{Interpolated, Mode, Recording};
 use spts_input::Refusal;
 use spts_models::{ConductanceMap, PressureMap, SkinLayout};
 use std::fmt::Display;
@@ -43,6 +43,8 @@ pub struct PressFacts {
     pub pressure: Option<PressureMap>,
     /// Conductance of each taxel, S, as the readout saw it.
     pub conductance: Option<ConductanceMap>,
+    /// Conductance over the time of the block, where it was simulated just now: no folder keeps it.
+    pub course: Option<Interpolated>,
 }
 
 /// A recording, with the facts known about its blocks.

@@ -97,6 +97,7 @@ prop_compose! {
             force_n: k.is_multiple_of(2).then_some(20.0 / 3.0),
             pressure: Some(Grid::from_values(rows, cols, (0..rows * cols).map(|i| i as f64 / 3.0).collect())),
             conductance: (k > 0).then(|| Grid::from_values(rows, cols, vec![1e-5 / 3.0; rows * cols])),
+            course: None,
         };
         Recorded { recording, conditioning: conditioning.min(blocks), presses: if known { (0..blocks).map(facts).collect() } else { Vec::new() } }
     }

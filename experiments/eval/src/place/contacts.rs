@@ -13,10 +13,13 @@ const QUIET_FRAMES: usize = 20;
 /// Touched when the output of a frame, without that of the untouched skin, is this many times as large as in the quiet
 /// frames.
 const THRESHOLD: f64 = 2.0;
+/// The touch begins with the first of the frames before that which are so many times as large: four standard
+/// deviations, 1/√200, of a frame of 100 samples of noise.
+const BEGINNING: f64 = 1.3;
 /// A touch lasts for at least as many frames.
 const SHORTEST_FRAMES: usize = 5;
 /// Frames before a touch that the untouched skin is not estimated from.
-const MARGIN_FRAMES: usize = 5;
+const MARGIN_FRAMES: usize = 10;
 
 /// A touch found in a recording that does not say when it is touched: measurements `start..end` of a block.
 #[derive(Debug, Clone, PartialEq)]
@@ -53,7 +56,9 @@ pub(crate) fn touch_of(recording: &Recording, block: usize) -> Option<RecordedTo
         let levels = levels(recording, block, &untouched);
         let limit = THRESHOLD * median(&levels[..quiet])?;
         let touched = |frame: &[f64]| frame.iter().all(|level| *level > limit);
-        let first = levels[QUIET_FRAMES..].windows(SHORTEST_FRAMES).position(touched)? + QUIET_FRAMES;
+        let sure = levels[QUIET_FRAMES..].windows(SHORTEST_FRAMES).position(touched)? + QUIET_FRAMES;
+        let before = levels[QUIET_FRAMES..sure].iter().rev();
+        let first = sure - before.take_while(|level| **level > BEGINNING / THRESHOLD * limit).count();
         let last = levels.iter().rposition(|level| *level > limit)?;
         found = Some(RecordedTouch { block, start: first * per_frame, end: (last + 1) * per_frame, untouched });
         quiet = first.saturating_sub(MARGIN_FRAMES).max(QUIET_FRAMES);

@@ -89,7 +89,7 @@ pub(super) fn simulate(seed: u64, size: &ReproductionSize, done: &(dyn Fn() + Sy
                 summed: size.compressive_presses,
                 conditioning: size.real_protocol.first_press,
             };
-            let SkinRunPresses { session, presses } = run.record(done)?;
+            let SkinRunPresses { session, presses, .. } = run.record(done)?;
             let plateau_s = PLATEAU * scene.duration_s();
             let pressure_pa = presses
                 .first()
