@@ -1,6 +1,8 @@
 //! The commands of `spts`.
 
 #[cfg(feature = "full")]
+mod bench;
+#[cfg(feature = "full")]
 mod budget;
 #[cfg(feature = "full")]
 mod calibrate;
@@ -26,8 +28,6 @@ mod import;
 mod live;
 #[cfg_attr(not(feature = "full"), expect(dead_code, reason = "some belong to commands that are left out"))]
 mod options;
-#[cfg(feature = "full")]
-mod readouts;
 mod record;
 #[cfg(feature = "full")]
 mod reproduce;
@@ -95,6 +95,8 @@ commands! {
     #[cfg(feature = "full")]
     Compare(compare::CompareCommand),
     #[cfg(feature = "full")]
+    Bench(bench::BenchCommand),
+    #[cfg(feature = "full")]
     Budget(budget::BudgetCommand),
     #[cfg(feature = "full")]
     Circuit(circuit::CircuitCommand),
@@ -104,8 +106,6 @@ commands! {
     Firmware(firmware::FirmwareCommand),
     #[cfg(feature = "full")]
     Live(live::LiveCommand),
-    #[cfg(feature = "full")]
-    Readouts(readouts::ReadoutsCommand),
     #[cfg(feature = "full")]
     Sensing(Box<sensing::SensingCommand>),
     Import(import::ImportCommand),

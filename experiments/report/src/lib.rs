@@ -1,6 +1,7 @@
 //! Reports: the tables and figures of every study, and one page that opens from disk.
 
 pub mod animation;
+pub mod bench;
 pub mod budget;
 pub mod calibrate;
 pub mod compare;
@@ -16,7 +17,6 @@ mod html;
 mod labels;
 mod origin;
 pub mod per_object;
-pub mod readouts;
 pub mod reproduce;
 pub mod score;
 pub mod sensing;

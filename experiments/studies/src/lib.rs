@@ -11,7 +11,7 @@ pub mod fidelity;
 pub mod firmware;
 pub mod frames;
 pub mod per_object;
-pub mod readouts;
+pub mod bench;
 pub mod sensing;
 pub mod tolerances;
 pub mod touches;

@@ -3,7 +3,7 @@
 //! A `TouchScene` defines objects and skin, and its `draw` presses the objects. A `TouchWire` measures the touches
 //! through a readout profile with any weights, and a `TouchScore` compares an image with the touch.
 
-use spts_circuit::{Constant, Mode, Profile, Readout, RecordingInfo, Weights};
+use spts_circuit::{ConductanceSource, Constant, Mode, Profile, Readout, RecordingInfo, Weights};
 use spts_dataset::{Maker, Spec};
 use spts_input::Refusal;
 use spts_models::{ConductanceMap, SkinLayout, Streams};
@@ -34,8 +34,12 @@ pub(crate) struct TouchScene {
     pub layout: SkinLayout,
     /// Kind of the objects.
     pub objects: TouchObjects,
+    /// Families of procedural shapes; empty for all.
+    pub families: &'static [&'static str],
     /// Smallest and largest extent of a procedural shape, m; `None` for the default 20 to 90 mm.
     pub size_m: Option<[f64; 2]>,
+    /// Place, m from the middle, rotation, degrees, and force, N, of every touch; `None` for random ones.
+    pub pose: Option<[f64; 4]>,
     /// Whether objects keep their published places and rotations, at the same distance in metres from the middle of any
     /// sheet. Only for [`TouchObjects::Objects`].
     pub placed: bool,
@@ -62,10 +66,21 @@ pub struct Touch {
     pub centre_px: Option<[f64; 2]>,
 }
 
+impl Touch {
+    /// The touch called `name` of a skin of this layout that conducts `conductance_s` above the idle skin.
+    pub(crate) fn new(name: Arc<str>, conductance_s: ConductanceMap, layout: &SkinLayout) -> Self {
+        let mut mask = Vec::new();
+        support(conductance_s.values(), SUPPORT_THRESHOLD, &mut mask);
+        let centre_px = centre_of_mass(conductance_s.values(), layout.cols(), SUPPORT_THRESHOLD);
+        Self { name, conductance_s, support: mask, centre_px }
+    }
+}
+
 impl TouchScene {
     /// A scene with `touches` touches of `objects` on a skin.
     pub(crate) fn new(layout: SkinLayout, objects: TouchObjects, touches: usize, seed: u64) -> Self {
-        Self { layout, objects, size_m: None, placed: false, contacts: 1, touches, seed, specimen: None }
+        let (families, size_m, pose, specimen) = (&[][..], None, None, None);
+        Self { layout, objects, families, size_m, pose, placed: false, contacts: 1, touches, seed, specimen }
     }
 
     /// Presses all touches. The result depends only on the scene.
@@ -81,15 +96,7 @@ impl TouchScene {
         (0..self.touches as u64)
             .map(|index| {
                 let row = maker.row(index)?;
-                let conductance_s = row.conductance().clone();
-                let mut mask = Vec::new();
-                support(conductance_s.values(), SUPPORT_THRESHOLD, &mut mask);
-                Ok(Touch {
-                    name: row.name(),
-                    centre_px: centre_of_mass(conductance_s.values(), self.layout.cols(), SUPPORT_THRESHOLD),
-                    conductance_s,
-                    support: mask,
-                })
+                Ok(Touch::new(row.name(), row.conductance().clone(), &self.layout))
             })
             .collect()
     }
@@ -104,15 +111,25 @@ impl TouchScene {
             TouchObjects::Shapes => ("shapes", "middle"),
             TouchObjects::Objects => ("objects", if self.placed { "placement" } else { "middle" }),
         };
-        let size = self.size_m.map_or_else(String::new, |[least, most]| format!("size_m = [{least:e}, {most:e}]\n"));
-        let pose = if self.placed {
-            String::new()
-        } else {
-            format!(
+        let mut size =
+            self.size_m.map_or_else(String::new, |[least, most]| format!("size_m = [{least:e}, {most:e}]\n"));
+        if !self.families.is_empty() {
+            size.push_str(&format!("names = {:?}\n", self.families));
+        }
+        let pose = match self.pose {
+            Some([x_m, y_m, rotation_deg, _]) => {
+                format!("x_m = {x_m:e}\ny_m = {y_m:e}\nrotation_deg = {rotation_deg:e}\n")
+            }
+            None if self.placed => String::new(),
+            None => format!(
                 "x_share = {{ uniform = [{:e}, {x:e}] }}\ny_share = {{ uniform = [{:e}, {y:e}] }}\n\
                  rotation_deg = {{ uniform = [-180.0, 180.0] }}\n",
                 -x, -y
-            )
+            ),
+        };
+        let force = match self.pose {
+            Some([.., force_n]) => format!("{force_n:e}"),
+            None => "{ log_uniform = [5.0, 40.0] }".to_owned(),
         };
         let contacts = self.contacts;
         let (touches, seed, specimen) = (self.touches, self.seed >> 1, self.specimen.unwrap_or(self.seed) % (1 << 53));
@@ -121,7 +138,7 @@ impl TouchScene {
              [object]\nfrom = \"{from}\"\nrows_per_shape = 1\ncount = {contacts}\n{size}\
              [pose]\nabout = \"{about}\"\n{pose}\
              tilt_x_deg = {{ normal = [0.0, 0.3] }}\ntilt_y_deg = {{ normal = [0.0, 0.3] }}\n\
-             [press]\nforce_n = {{ log_uniform = [5.0, 40.0] }}\nhold_s = {{ uniform = [0.3, 1.0] }}\n\
+             [press]\nforce_n = {force}\nhold_s = {{ uniform = [0.3, 1.0] }}\n\
              [skin]\nrows = {}\ncols = {}\npitch_m = {:e}\nelectrode_m = {:e}\nrows_per_skin = {touches}\nseed = {specimen}\n\
              [record]\nmeasurements = 1\nraster = false\nlabels = []\n",
             layout.rows(),
@@ -191,9 +208,21 @@ impl TouchWire {
         number: u64,
         measurements: usize,
     ) -> Result<Vec<f64>, Refusal> {
-        let mut source = Constant::new(conductance_s)?;
-        self.readout.seek_row(number, 0);
-        self.readout.measure(&mut source, measurements)
+        self.volts_of(&mut Constant::new(conductance_s)?, [number, 0], measurements)
+    }
+
+    /// The same of a skin whose conductance changes, from the row `at[1]` of the block `at[0]` on.
+    ///
+    /// # Errors
+    /// As [`TouchWire::volts`].
+    pub(crate) fn volts_of(
+        &mut self,
+        source: &mut dyn ConductanceSource,
+        at: [u64; 2],
+        measurements: usize,
+    ) -> Result<Vec<f64>, Refusal> {
+        self.readout.seek_row(at[0], at[1]);
+        self.readout.measure(source, measurements)
     }
 
     /// The same samples, minus the mean of the untouched skin, V.

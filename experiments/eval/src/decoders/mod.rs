@@ -220,9 +220,17 @@ impl TrainedDecoder {
     }
 
     /// `trained`, which has learned from `data`.
-    pub(crate) fn of(trained: Arc<dyn Trained>, data: &TrainingData) -> Self {
+    pub fn of(trained: Arc<dyn Trained>, data: &TrainingData) -> Self {
         let classifier = Src::new(data.library.clone(), Src::PUBLISHED_SPARSITY);
         Self { trained, classifier: Arc::new(classifier) }
+    }
+
+    /// Called after all windows are decoded, as [`Trained::finish`].
+    ///
+    /// # Errors
+    /// [`Refusal`] of an external program that did not end well.
+    pub fn finish(&self) -> Result<(), Refusal> {
+        Ok(self.trained.finish()?)
     }
 }
 

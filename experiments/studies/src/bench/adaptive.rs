@@ -1,9 +1,12 @@
-//! Scans taxels one by one, guided by the contacts found.
+//! Entrants that choose the next measurement by those before: taxels around a contact, and halves of a part that is
+//! touched.
 
-use super::wire::{WireFrame, WireSession};
-use super::{Reading, ReadoutSkin, WireReadout, until_noticed};
+use super::wire::{NEUTRAL, WireFrame, WireSession};
+use super::{Entrant, Reader, Reading};
+use spts_circuit::CellCodes;
 use spts_input::Refusal;
 use std::collections::VecDeque;
+use std::ops::Range;
 
 /// Adaptive sub-sampling: single taxels on ever finer grids until one is touched; then its neighbours, and theirs,
 /// before the grids go on. Taxels that were not read are filled in from those that were.
@@ -15,7 +18,6 @@ pub(super) struct Adaptive {
     cols: usize,
     /// Taxels in order of scanning, coarse grids first.
     order: Vec<usize>,
-    counts: Vec<usize>,
 }
 
 /// All taxels of a sheet: those of the coarsest grid first, then those that halve its pitch along both axes, and so on;
@@ -43,9 +45,8 @@ fn coarse_to_fine(rows: usize, cols: usize) -> Vec<usize> {
 }
 
 impl Adaptive {
-    pub(super) fn new(skin: &ReadoutSkin) -> Self {
-        let (rows, cols) = (skin.layout.rows(), skin.layout.cols());
-        Self { rows, cols, order: coarse_to_fine(rows, cols), counts: skin.measurements() }
+    pub(super) fn new(rows: usize, cols: usize) -> Self {
+        Self { rows, cols, order: coarse_to_fine(rows, cols) }
     }
 
     /// The taxels within one row and column of `taxel`, itself among them.
@@ -110,22 +111,147 @@ impl Adaptive {
     }
 }
 
-impl WireReadout for Adaptive {
+impl Entrant for Adaptive {
     fn largest_sum_s(&self, conductance_s: &[f64]) -> f64 {
         conductance_s.iter().copied().fold(0.0, f64::max)
     }
 
-    fn read(&self, wire: &mut WireSession<'_>) -> Result<Vec<Reading>, Refusal> {
+    fn start(&self) -> Box<dyn Reader + '_> {
+        Box::new(self)
+    }
+}
+
+impl Reader for &Adaptive {
+    fn read(&mut self, wire: &mut WireSession<'_>) -> Result<Reading, Refusal> {
         // all taxels are measured once, and the samples are those at the taxels that are asked for
-        let frame = wire.scan()?;
-        let beyond: Vec<bool> = self.order.iter().map(|k| frame.volts[*k] > frame.alarm_v).collect();
-        let reading = |&count: &usize| {
-            let read = self.read_taxels(&frame, count);
-            // an idle skin is scanned at the first taxels of the order, over and over
-            let noticed = until_noticed(&beyond[..count.min(beyond.len())]);
-            Reading { measurements: count, image: self.fill(&frame, &read, count), noticed, placed: noticed }
-        };
-        Ok(self.counts.iter().map(reading).collect())
+        let count = wire.left().min(self.order.len());
+        let frame = wire.whole_scan(self.order.len())?;
+        wire.choose(count)?;
+        let read = self.read_taxels(&frame, count);
+        Ok(Reading::of(self.fill(&frame, &read, count)))
+    }
+}
+
+/// A binary search: the sum of a part of the sheet, and where it is beyond the alarm, of its halves, the largest part
+/// first. A part that was not divided has its sum spread over its taxels.
+pub(super) struct BinarySearch {
+    parts: Parts,
+}
+
+/// Parts of a sheet, each before its halves: rows and columns. The first is all of it.
+#[derive(Clone)]
+struct Parts(Vec<(Range<usize>, Range<usize>)>, usize);
+
+/// The largest parts have a sixteenth of the taxels: sums of more would leave no volts to a taxel.
+const LARGEST_PART: usize = 16;
+
+impl Parts {
+    fn new(rows: usize, cols: usize) -> Self {
+        let mut parts = vec![(0..rows, 0..cols)];
+        let mut at = 0;
+        while let Some(part) = parts.get(at).cloned() {
+            parts.extend(halves(&part).into_iter().flatten());
+            at += 1;
+        }
+        Self(parts, cols)
+    }
+
+    /// The numbers of the parts from which the search begins.
+    fn first(&self) -> Vec<usize> {
+        let taxels = self.size(0);
+        let small = |k: &usize| self.size(*k) * LARGEST_PART <= taxels;
+        // parts of which no larger one is small
+        let mut first: Vec<usize> = Vec::new();
+        for k in (0..self.0.len()).filter(small) {
+            let within = |k: usize, of: usize| {
+                let ((r, c), (rows, cols)) = (&self.0[k], &self.0[of]);
+                rows.start <= r.start && r.end <= rows.end && cols.start <= c.start && c.end <= cols.end
+            };
+            if !first.iter().any(|&of| within(k, of)) {
+                first.push(k);
+            }
+        }
+        first
+    }
+
+    fn size(&self, part: usize) -> usize {
+        self.0[part].0.len() * self.0[part].1.len()
+    }
+
+    fn number(&self, part: &(Range<usize>, Range<usize>)) -> Option<usize> {
+        self.0.iter().position(|other| other == part)
+    }
+
+    fn taxels(&self, part: usize) -> impl Iterator<Item = usize> + '_ {
+        let (rows, cols) = &self.0[part];
+        rows.clone().flat_map(move |r| cols.clone().map(move |c| r * self.1 + c))
+    }
+}
+
+/// Both halves along the longer side; `None` of a taxel.
+fn halves((rows, cols): &(Range<usize>, Range<usize>)) -> Option<[(Range<usize>, Range<usize>); 2]> {
+    let middle = |range: &Range<usize>| range.start + range.len().div_ceil(2);
+    if rows.len() * cols.len() < 2 {
+        return None;
+    }
+    Some(if rows.len() >= cols.len() {
+        let at = middle(rows);
+        [(rows.start..at, cols.clone()), (at..rows.end, cols.clone())]
+    } else {
+        let at = middle(cols);
+        [(rows.clone(), cols.start..at), (rows.clone(), at..cols.end)]
+    })
+}
+
+/// Row k is part k at level 1.
+impl CellCodes for Parts {
+    fn taxels(&self) -> usize {
+        self.size(0)
+    }
+
+    fn codes(&mut self, first_row: u64, out: &mut [u8]) -> Result<(), Refusal> {
+        out.fill(NEUTRAL);
+        for (row, codes) in (first_row..).zip(out.chunks_exact_mut(self.size(0))) {
+            #[expect(clippy::cast_possible_truncation, reason = "less than the number of parts")]
+            let part = (row % self.0.len() as u64) as usize;
+            self.taxels(part).for_each(|taxel| codes[taxel] = u8::MAX);
+        }
+        Ok(())
+    }
+}
+
+impl BinarySearch {
+    pub(super) fn new(rows: usize, cols: usize) -> Self {
+        Self { parts: Parts::new(rows, cols) }
+    }
+}
+
+impl Entrant for BinarySearch {
+    fn largest_sum_s(&self, conductance_s: &[f64]) -> f64 {
+        let sum = |part: &usize| self.parts.taxels(*part).map(|k| conductance_s[k]).sum::<f64>();
+        self.parts.first().iter().map(sum).fold(0.0, f64::max)
+    }
+
+    fn start(&self) -> Box<dyn Reader + '_> {
+        Box::new(self)
+    }
+}
+
+impl Reader for &BinarySearch {
+    fn read(&mut self, wire: &mut WireSession<'_>) -> Result<Reading, Refusal> {
+        let all = self.parts.0.len();
+        let mut image = vec![0.0; self.parts.size(0)];
+        let mut next: VecDeque<usize> = self.parts.first().into();
+        while let Some(part) = next.pop_front().filter(|_| wire.left() > 0) {
+            let (volts, alarm_v) = wire.single(&self.parts, all, part)?;
+            let touched = volts > alarm_v;
+            let each = if touched { volts / self.parts.size(part) as f64 } else { 0.0 };
+            self.parts.taxels(part).for_each(|taxel| image[taxel] = each);
+            if let Some(halves) = halves(&self.parts.0[part]).filter(|_| touched) {
+                next.extend(halves.iter().filter_map(|half| self.parts.number(half)));
+            }
+        }
+        Ok(Reading::of(image))
     }
 }
 
@@ -151,7 +277,7 @@ mod tests {
     /// A patch of 3 × 3 whose middle is on a grid is read as a whole, with a rim, once the grid has found it.
     #[test]
     fn a_contact_is_read_densely() {
-        let grids = Adaptive { rows: 32, cols: 32, order: coarse_to_fine(32, 32), counts: Vec::new() };
+        let grids = Adaptive::new(32, 32);
         let mut frame = WireFrame { volts: vec![0.0; 1024], alarm_v: 0.5 };
         for taxel in grids.around(8 * 32 + 8, 1) {
             frame.volts[taxel] = 1.0;
@@ -164,6 +290,18 @@ mod tests {
             let touched = grids.around(8 * 32 + 8, 1).any(|t| t == k);
             // what is filled in beside it does not count as touched
             assert!(if touched { *v > 0.99 } else { *v < SUPPORT_THRESHOLD }, "taxel {k}: {v}");
+        }
+    }
+
+    /// Every taxel is a part, every part is there once, and the first ones are the sheet.
+    #[test]
+    fn parts_divide_the_sheet() {
+        for (rows, cols) in [(10, 10), (7, 3)] {
+            let parts = Parts::new(rows, cols);
+            assert_eq!(parts.0.len(), 2 * rows * cols - 1);
+            let mut first: Vec<usize> = parts.first().into_iter().flat_map(|k| parts.taxels(k)).collect();
+            first.sort_unstable();
+            assert!(first.into_iter().eq(0..rows * cols), "{rows} × {cols}");
         }
     }
 }

@@ -1,24 +1,30 @@
-//! The common wire as a readout sees it.
+//! The common wire as an entrant sees it.
 
+use super::tasks::{Fault, Trial};
+use super::rows::OneByOne;
 use crate::electronics::ElectronicsStudy;
-use crate::touches::{Touch, TouchWire};
+use crate::touches::TouchWire;
 use crate::wiring::{Fitted, amplifier, bisected, pressed_skin, sums};
 use rand_distr::{Distribution as _, StandardNormal};
 use spts_circuit::amplifier::{Budget, Setting};
-use spts_circuit::{CellCodes, CompressiveWeights, Mode, Patterns, Profile, Readout, Seeding, Span};
+use spts_circuit::{CellCodes, Interpolated, Mode, Patterns, Profile, Readout, Seeding, Span};
 use spts_input::Refusal;
 use spts_models::{ConductanceMap, SkinLayout, Streams};
+use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// Frames of the idle skin that the reference is the mean of.
 const IDLE_FRAMES: usize = 4;
 /// Measurements of the idle skin at least: its noise is estimated from them.
 const IDLE_MEASUREMENTS: usize = 512;
 /// Number of the idle skin's block; touches have numbers far below.
-const IDLE_BLOCK: u64 = 1 << 40;
+const IDLE_BLOCK: u64 = 1 << 60;
+/// Frames of a trial that differ in noise.
+const FRAMES: u64 = 1 << 20;
 /// Mean time between false alarms that is accepted, s.
 const FALSE_ALARM_S: f64 = 10.0;
 
-/// The samples of a few measurements during a held touch, and the threshold that tells a touch from noise.
+/// The samples of a few measurements during a touch, and the threshold that tells a touch from noise.
 #[derive(Debug, Clone, PartialEq)]
 pub struct WireFrame {
     /// Samples minus those of the idle skin at the same rows, V.
@@ -46,12 +52,6 @@ impl WireFrame {
         }
         image
     }
-
-    /// `until_noticed` of the first `count` measurements, whose samples may have either sign.
-    pub fn noticed(&self, count: usize) -> Option<f64> {
-        let beyond: Vec<bool> = self.volts[..count].iter().map(|v| v.abs() > self.alarm_v).collect();
-        super::until_noticed(&beyond)
-    }
 }
 
 /// What the idle skin reads, once a session.
@@ -62,29 +62,70 @@ struct Idle {
     sd_v: f64,
 }
 
-/// A wire with its parts in one session, while a touch is held. A [`WireReadout`](super::WireReadout) requests
-/// measurements of one kind of rows from it, touch after touch, and has no access to the touch itself.
+/// A wire with its parts in one session, while the skin is touched. An entrant requests measurements from it, frame
+/// after frame, and has no access to the touch itself.
 pub struct WireSession<'a> {
     /// Electronics and clock.
     pub skin: &'a SkinWire,
-    /// Profile, which is the same in both modes. Its feedback resistance suits the readout's sums.
+    /// Profile, which is the same in both modes. Its feedback resistance suits the entrant's sums.
     pub profile: Profile,
-    /// Levels of the codes 0 and 255 according to the data sheet of the cells' converters.
-    pub levels: [f64; 2],
+    /// Code and level of +1; −1 is code 0, with the level opposite to it.
+    plus: (u8, f64),
     /// Relative noise of a contact in this session.
     contact_noise: f64,
     device: Streams,
-    /// Conductances of the touch minus those of the idle skin, S, and its number, which determines its noise.
-    held: (Vec<f64>, u64),
-    /// The readout, and its output without a touch; built with the first frame.
-    frames: Option<(TouchWire, Idle)>,
+    faults: Arc<[(usize, Fault)]>,
+    held: Held,
+    /// Readouts with what they give without a touch, by the rows that they measure.
+    frames: BTreeMap<usize, (TouchWire, Idle)>,
 }
 
-impl WireSession<'_> {
-    /// The wire while `touch` is held. `number` determines its noise.
-    pub fn hold(&mut self, touch: &Touch, number: u64) -> &mut Self {
-        self.held = (touch.conductance_s.values().to_vec(), number);
-        self
+/// The trial that a session is in.
+struct Held {
+    /// Conductances with those of the idle skin, S.
+    source: Interpolated,
+    /// Determines its noise.
+    number: u64,
+    /// Frames that were measured.
+    frame: u64,
+    /// Start of the next frame, s.
+    clock_s: f64,
+    /// Measurements that may still be taken.
+    left: usize,
+}
+
+impl<'a> WireSession<'a> {
+    /// The wire during `trial` from `start_s` on, with at most `most` measurements. `number` determines the noise.
+    ///
+    /// # Errors
+    /// [`Refusal`] for conductances that are none.
+    pub fn hold(&mut self, trial: &Trial, number: u64, start_s: f64, most: usize) -> Result<&mut Self, Refusal> {
+        if self.held.number != number {
+            let idle_s = self.skin.electronics.skin.idle_s;
+            let whole = |map: &ConductanceMap| {
+                let mut map = map.clone();
+                let gains = trial.idle_gains.iter().copied().chain(std::iter::repeat(1.0));
+                map.values_mut().iter_mut().zip(gains).for_each(|(g, gain)| *g += gain * idle_s);
+                map
+            };
+            let source = Interpolated::new(trial.times_s.clone(), trial.maps.iter().map(whole).collect())?;
+            self.held = Held { source, number, frame: 0, clock_s: start_s, left: most };
+        }
+        (self.held.clock_s, self.held.left) = (start_s, most);
+        Ok(self)
+    }
+
+    /// Measurements that may still be taken of this touch.
+    pub fn left(&self) -> usize {
+        self.held.left
+    }
+
+    /// Takes `count` measurements off those that are left.
+    fn spend(&mut self, count: usize) -> Result<(), Refusal> {
+        let left = self.held.left.checked_sub(count);
+        let over = || Refusal::new(format!("{count} measurements are asked for; {} are left", self.held.left));
+        self.held.left = left.ok_or_else(over)?;
+        Ok(())
     }
 
     /// Threshold for samples of this standard deviation: with Chernoff's bound of a Gaussian's two tails, 2 exp(−z²/2),
@@ -93,31 +134,31 @@ impl WireSession<'_> {
         sd_v * (2.0 * (2.0 * FALSE_ALARM_S / self.skin.period_s).ln()).sqrt()
     }
 
-    /// The samples of a frame of `measurements` rows of the whole skin, by the readout that `build` makes.
-    fn frame(
+    /// The samples at the rows `measured` of `rows`, of which there are `all`. `key` names them within the session.
+    fn frame<R: CellCodes + Clone + 'static>(
         &mut self,
-        measurements: usize,
-        build: impl FnOnce(&Self) -> Result<Readout, Refusal>,
+        key: usize,
+        rows: &R,
+        all: usize,
+        measured: std::ops::Range<usize>,
     ) -> Result<WireFrame, Refusal> {
-        let (mut wire, idle) = match self.frames.take() {
-            Some(frames) if frames.1.volts.len() == measurements => frames,
-            _ => {
-                let mut wire = TouchWire::of(build(self)?);
-                let idle = self.idle(&mut wire, measurements)?;
-                (wire, idle)
-            }
-        };
-        let idle_s = self.skin.electronics.skin.idle_s;
-        let pressed = self.held.0.iter().map(|g| g + idle_s).collect();
-        let mut volts = wire.volts(self.map(pressed), self.held.1, measurements)?;
-        volts.iter_mut().zip(&idle.volts).for_each(|(v, idle)| *v -= idle);
-        let alarm_v = self.alarm_v(idle.sd_v);
-        self.frames = Some((wire, idle));
+        if !self.frames.contains_key(&key) {
+            let readout = Readout::new(&self.profile, Mode::Raster, &self.skin.layout, self.device, 0)?;
+            let cells = Cells { rows: rows.clone(), plus: self.plus.0, faults: Arc::clone(&self.faults) };
+            let mut wire = TouchWire::of(readout.with_codes(|_| Ok(Box::new(cells.clone())))?);
+            let idle = self.idle(&mut wire, all)?;
+            self.frames.insert(key, (wire, idle));
+        }
+        let alarm_v = self.alarm_v(self.frames.get(&key).map_or(0.0, |(_, idle)| idle.sd_v));
+        let Held { source, number, frame, clock_s, .. } = &mut self.held;
+        let Some((wire, idle)) = self.frames.get_mut(&key) else { return Err(Refusal::new("no frame")) };
+        // the block's time begins with its first row
+        let before_s = measured.start as f64 * self.skin.period_s;
+        let mut now = source.starting_at(*clock_s - before_s);
+        let mut volts = wire.volts_of(&mut now, [*number * FRAMES + *frame, measured.start as u64], measured.len())?;
+        (*frame, *clock_s) = (*frame + 1, *clock_s + measured.len() as f64 * self.skin.period_s);
+        volts.iter_mut().zip(&idle.volts[measured]).for_each(|(v, idle)| *v -= idle);
         Ok(WireFrame { volts, alarm_v })
-    }
-
-    fn map(&self, values: Vec<f64>) -> ConductanceMap {
-        ConductanceMap::from_values(self.skin.layout.rows(), self.skin.layout.cols(), values)
     }
 
     /// Frames of the idle skin: their mean, and how far single ones are from it.
@@ -125,9 +166,11 @@ impl WireSession<'_> {
         let frames = IDLE_FRAMES.max(IDLE_MEASUREMENTS.div_ceil(measurements));
         let mut volts = vec![0.0; measurements];
         let mut squares = 0.0;
+        let layout = &self.skin.layout;
+        let idle_s = vec![self.skin.electronics.skin.idle_s; layout.taxels()];
+        let idle = ConductanceMap::from_values(layout.rows(), layout.cols(), idle_s);
         for frame in 0..frames as u64 {
-            let idle = self.map(vec![self.skin.electronics.skin.idle_s; self.skin.layout.taxels()]);
-            let frame = wire.volts(idle, IDLE_BLOCK + frame, measurements)?;
+            let frame = wire.volts(idle.clone(), IDLE_BLOCK + frame, measurements)?;
             for (sum, v) in volts.iter_mut().zip(frame) {
                 *sum += v;
                 squares += v * v;
@@ -140,59 +183,93 @@ impl WireSession<'_> {
         Ok(Idle { volts, sd_v: (variance * (1.0 + 1.0 / count)).sqrt() })
     }
 
-    /// A raster frame: sample k has taxel k at level 1, and all others at 0.
+    /// A scan of the first `count` taxels: sample k has taxel k at level 1, and all others at 0.
     ///
     /// # Errors
-    /// [`Refusal`] if the readout cannot be built.
-    pub fn scan(&mut self) -> Result<WireFrame, Refusal> {
-        self.frame(self.skin.layout.taxels(), |session| {
-            Readout::new(&session.profile, Mode::Raster, &session.skin.layout, session.device, 0)
-        })
+    /// [`Refusal`] if the readout cannot be built, or more is asked for than is left.
+    pub fn scan(&mut self, count: usize) -> Result<WireFrame, Refusal> {
+        self.spend(count)?;
+        self.whole_scan(count)
     }
 
-    /// A frame of `measurements` rows of ±1. All frames of a session must have the same kind of rows.
+    /// A scan of the first `count` taxels whose measurements are counted by [`WireSession::choose`].
+    pub(super) fn whole_scan(&mut self, count: usize) -> Result<WireFrame, Refusal> {
+        let taxels = self.skin.layout.taxels();
+        self.frame(SCAN, &OneByOne { taxels }, taxels, 0..count)
+    }
+
+    /// Counts the measurements of taxels that are chosen from a whole scan.
+    pub(super) fn choose(&mut self, count: usize) -> Result<(), Refusal> {
+        self.spend(count)
+    }
+
+    /// A frame of `measurements` rows of ±1, in units of the conductance of a taxel at level 1 times volts a siemens:
+    /// y = Φ x. Other rows need another `key`.
     ///
     /// # Errors
-    /// [`Refusal`] if the rows belong to another skin.
+    /// [`Refusal`] if the rows belong to another skin, or more is asked for than is left.
     pub fn signs<R: CellCodes + Clone + 'static>(
         &mut self,
+        key: usize,
         rows: &R,
         measurements: usize,
     ) -> Result<WireFrame, Refusal> {
-        self.frame(measurements, |session| {
-            let profile = Profile { weights: CompressiveWeights::Binary, ..session.profile.clone() };
-            let readout = Readout::new(&profile, Mode::Compressive, &session.skin.layout, session.device, 0)?;
-            readout.with_codes(|_| Ok(Box::new(rows.clone())))
-        })
+        self.spend(measurements)?;
+        let mut frame = self.frame(key, rows, measurements, 0..measurements)?;
+        frame.volts.iter_mut().for_each(|v| *v /= self.plus.1);
+        frame.alarm_v /= self.plus.1;
+        Ok(frame)
+    }
+
+    /// Row `row` of `rows`, of which there are `all`: a sample by itself, and the alarm.
+    ///
+    /// # Errors
+    /// As [`WireSession::signs`].
+    pub(super) fn single<R: CellCodes + Clone + 'static>(
+        &mut self,
+        rows: &R,
+        all: usize,
+        row: usize,
+    ) -> Result<(f64, f64), Refusal> {
+        self.spend(1)?;
+        let frame = self.frame(SINGLE, rows, all, row..row + 1)?;
+        Ok((frame.volts.first().copied().unwrap_or(0.0), frame.alarm_v))
     }
 
     /// Each cell's own measurement of its taxel, S: the conductance minus that of the idle skin, with the relative
-    /// noise of a contact. It is for cells with a converter of their own; the receiver at the end of the wire does not
-    /// know it.
-    pub(crate) fn own_values_s(&self) -> Vec<f64> {
-        let mut rng = self.device.rng("readouts/cells", self.held.1);
-        let noisy = |g: &f64| {
+    /// noise of a contact; 0 of a cell that does not work. It is for cells with a converter of their own; the receiver
+    /// at the end of the wire does not know it.
+    pub(super) fn own_values_s(&self) -> Vec<f64> {
+        let mut rng = self.device.rng("bench/cells", self.number());
+        let idle_s = self.skin.electronics.skin.idle_s;
+        let noisy = |(taxel, g): (usize, &f64)| {
             let normal: f64 = StandardNormal.sample(&mut rng);
-            g * (1.0 + self.contact_noise * normal)
+            let works = self.faults.iter().all(|(k, fault)| *k != taxel || *fault == Fault::Late);
+            if works { (g - idle_s) * (1.0 + self.contact_noise * normal) } else { 0.0 }
         };
-        self.held.0.iter().map(noisy).collect()
+        self.held.source.at(self.held.clock_s).values().iter().enumerate().map(noisy).collect()
+    }
+
+    fn number(&self) -> u64 {
+        self.held.number * FRAMES + self.held.frame
     }
 
     /// Random numbers for events that are not synchronised with a clock; different for every touch.
-    pub fn moments(&self) -> Streams {
-        self.device.child("readouts/moments", self.held.1)
+    pub(super) fn moments(&self) -> Streams {
+        self.device.child("bench/moments", self.number())
     }
 
     /// Samples while a cell a taxel of `chips` puts out its codes through a resistor of its own with the conductance of
     /// a fully pressed taxel, and all other cells are off. `None` is a silent wire.
     ///
     /// # Errors
-    /// [`Refusal`] if the readout cannot be built.
-    pub(crate) fn transmissions(
+    /// [`Refusal`] if the readout cannot be built, or more is asked for than is left.
+    pub(super) fn transmissions(
         &mut self,
         chips: Option<&Patterns>,
         measurements: usize,
     ) -> Result<WireFrame, Refusal> {
+        self.spend(measurements)?;
         let published = SkinLayout::default();
         let line = |chips: &Patterns| -> Result<TouchWire, Refusal> {
             // the cells that transmit, whatever their places
@@ -207,9 +284,52 @@ impl WireSession<'_> {
         let pressed_s = self.skin.electronics.skin.pressed_s;
         let (chips, each_s) = chips.map_or((&silent, 0.0), |chips| (chips, pressed_s));
         let map = ConductanceMap::from_values(1, chips.taxels(), vec![each_s; chips.taxels()]);
-        let mut volts = line(chips)?.volts(map, self.held.1, measurements)?;
+        let mut volts = line(chips)?.volts(map, self.number(), measurements)?;
         volts.iter_mut().for_each(|v| *v -= idle_v);
+        self.held.frame += 1;
+        self.held.clock_s += measurements as f64 * self.skin.period_s;
         Ok(WireFrame { volts, alarm_v: self.alarm_v(variance.sqrt()) })
+    }
+}
+
+/// Keys of scans and of single rows.
+const SCAN: usize = usize::MAX;
+const SINGLE: usize = usize::MAX - 1;
+
+/// Cells that put out rows of the codes 0, 255 and neutral, some of which are faulty.
+#[derive(Clone)]
+struct Cells<R> {
+    rows: R,
+    /// Code of the level opposite to that of code 0.
+    plus: u8,
+    faults: Arc<[(usize, Fault)]>,
+}
+
+impl<R: CellCodes> CellCodes for Cells<R> {
+    fn taxels(&self) -> usize {
+        self.rows.taxels()
+    }
+
+    fn codes(&mut self, first_row: u64, out: &mut [u8]) -> Result<(), Refusal> {
+        let taxels = self.taxels();
+        let mut before = vec![NEUTRAL; taxels];
+        if first_row > 0 && !self.faults.is_empty() {
+            self.rows.codes(first_row - 1, &mut before)?;
+        }
+        self.rows.codes(first_row, out)?;
+        for codes in out.chunks_exact_mut(taxels) {
+            for (taxel, fault) in self.faults.iter() {
+                let meant = codes[*taxel];
+                codes[*taxel] = match fault {
+                    Fault::Dead => NEUTRAL,
+                    Fault::Stuck => u8::MAX,
+                    Fault::Late => before[*taxel],
+                };
+                before[*taxel] = meant;
+            }
+            codes.iter_mut().filter(|code| **code == u8::MAX).for_each(|code| *code = self.plus);
+        }
+        Ok(())
     }
 }
 
@@ -262,20 +382,19 @@ impl SkinWire {
         })
     }
 
-    /// Largest magnitude of Σ wₖ·gₖ that `readout` has with `touch`, S.
-    pub(crate) fn largest_sum_s(&self, readout: &dyn super::WireReadout, touch: &Touch) -> f64 {
-        let idle_s = self.electronics.skin.idle_s;
-        let pressed: Vec<f64> = touch.conductance_s.values().iter().map(|g| g + idle_s).collect();
-        readout.largest_sum_s(&pressed)
-    }
-
-    /// A session of a readout with the largest sum `largest_sum_s`, S. The feedback is the largest for which the sum
+    /// A session of an entrant with the largest sum `largest_sum_s`, S. The feedback is the largest for which the sum
     /// uses 70 % of the range of amplifier and converter, and the output settles within the clock's period. `device`
-    /// provides the random numbers; what a session draws is fixed in its profile, the same for all readouts.
+    /// provides the random numbers; what a session draws is fixed in its profile, the same for all entrants. Some cells
+    /// have `faults`.
     ///
     /// # Errors
     /// [`Refusal`] if the amplifier cannot be built, or a profile lacks a value.
-    pub fn session(&self, largest_sum_s: f64, device: Streams) -> Result<WireSession<'_>, Refusal> {
+    pub fn session(
+        &self,
+        largest_sum_s: f64,
+        device: Streams,
+        faults: Arc<[(usize, Fault)]>,
+    ) -> Result<WireSession<'_>, Refusal> {
         let session = device.child("session", 0);
         let built = Profile::named("as_built")?;
         let mut profile = Profile { feedback_ohm: self.feedback_ohm(largest_sum_s)?, ..self.base.clone() };
@@ -291,12 +410,19 @@ impl SkinWire {
         profile.raster.clone_from(&profile.compressive);
         Ok(WireSession {
             skin: self,
-            levels: levels(&profile)?,
+            plus: plus(&profile)?,
             profile,
             contact_noise,
             device,
-            held: (Vec::new(), 0),
-            frames: None,
+            faults,
+            held: Held {
+                source: Interpolated::new(vec![0.0], vec![ConductanceMap::zeros(1, 1)])?,
+                number: u64::MAX,
+                frame: 0,
+                clock_s: 0.0,
+                left: 0,
+            },
+            frames: BTreeMap::new(),
         })
     }
 
@@ -322,16 +448,20 @@ impl SkinWire {
     }
 }
 
-/// Middle levels of the codes 0 and 255 of the profile's converters: (c + errors − 127.5)/127.5, in steps.
-fn levels(profile: &Profile) -> Result<[f64; 2], Refusal> {
+/// Code of the level opposite to that of code 0, by the data sheet's middle values, and that level. Level of code c is
+/// (c + errors − 127.5)/127.5, errors in steps; the output does not go below the floor.
+fn plus(profile: &Profile) -> Result<(u8, f64), Refusal> {
     let number = |number: &'static str| match span(profile, "dac", number)? {
         Span::Fixed(value) => Ok(value),
         Span::Between([low, high]) => Ok::<_, Refusal>(0.5 * (low + high)),
     };
     let step_v = number("reference_v")? / 256.0;
     let (offset, gain) = (number("offset_v")? / step_v, number("gain_lsb")?);
-    let low = offset.max(number("floor_v")? / step_v);
-    Ok([low / 127.5 - 1.0, 1.0 + (offset + gain) / 127.5])
+    let low = offset.max(number("floor_v")? / step_v) / 127.5 - 1.0;
+    let level = |code: u8| (f64::from(code) * (1.0 + gain / 255.0) + offset) / 127.5 - 1.0;
+    let nearest = (128..=u8::MAX).min_by(|a, b| (level(*a) + low).abs().total_cmp(&(level(*b) + low).abs()));
+    let code = nearest.unwrap_or(u8::MAX);
+    Ok((code, 0.5 * (level(code) - low)))
 }
 
 /// What an effect of the profile draws a number from.
@@ -388,13 +518,14 @@ mod tests {
     #[test]
     fn noise_is_of_the_session() {
         let wire = wire(10);
-        let session = |sum_s: f64, seed: u64| wire.session(sum_s, Streams::new(seed)).unwrap();
+        let session = |sum_s: f64, seed: u64| wire.session(sum_s, Streams::new(seed), [].into()).unwrap();
         let noise = |sum_s: f64, seed: u64| session(sum_s, seed).contact_noise;
         assert!((noise(1e-3, 1) - noise(1e-2, 1)).abs() < f64::EPSILON);
         assert!((noise(1e-3, 1) - noise(1e-3, 2)).abs() > 1e-6);
         // every session of as_built has a value from this span
         assert!((0.04225..=0.07291).contains(&noise(1e-3, 1)));
-        let [low, high] = session(1e-3, 1).levels;
-        assert!((low - (11.797 / 127.5 - 1.0)).abs() < 1e-4 && (high - (1.0 - 1.1797 / 127.5)).abs() < 1e-4);
+        // code 0 has the level 11.797/127.5 − 1 = −0.9075, and code 244 (244 − 1.18)/127.5 − 1 = 0.9045
+        let (code, level) = session(1e-3, 1).plus;
+        assert!(code == 244 && (level - 0.906).abs() < 1e-3, "{code}: {level}");
     }
 }

@@ -1,15 +1,15 @@
 //! Event-driven code division: a taxel that changes sends its own signature at any time.
 
 use super::wire::{NEUTRAL, WireSession};
-use super::{Reading, ReadoutSkin, WireReadout};
+use super::{Entrant, Reader, Reading};
 use rand::RngExt as _;
 use spts_circuit::Patterns;
 use spts_circuit::amplifier::Skin;
 use spts_input::Refusal;
 use spts_models::Streams;
 
-/// Slots of a signature that are tried.
-const SLOTS: [usize; 4] = [128, 256, 512, 1024];
+/// Slots of a signature at least and at most.
+const SLOTS: [usize; 2] = [16, 1024];
 /// A touched taxel sends within so many slots of the onset: a millisecond of the published clock.
 const SPREAD: usize = 64;
 /// A cell sends when its taxel's conductance rises by this many times that of an idle taxel.
@@ -25,14 +25,12 @@ const LARGEST: f64 = 4.0;
 /// less than 60 ns, far less than a measurement of this wire.
 pub(super) struct Events {
     taxels: usize,
-    messages: Vec<Message>,
+    streams: Streams,
 }
 
 impl Events {
-    pub(super) fn new(skin: &ReadoutSkin) -> Self {
-        let taxels = skin.layout.taxels();
-        let message = |slots| Message::new(taxels, slots, skin.streams);
-        Self { taxels, messages: SLOTS.map(message).into() }
+    pub(super) fn new(taxels: usize, streams: Streams) -> Self {
+        Self { taxels, streams }
     }
 }
 
@@ -51,7 +49,7 @@ fn conductance_s(value: u8, largest_s: f64) -> f64 {
     (f64::from(value).max(0.5) / levels).powi(2) * largest_s
 }
 
-impl WireReadout for Events {
+impl Entrant for Events {
     /// Pulses of all cells that send, in a slot where four standard deviations of them have one sign.
     fn largest_sum_s(&self, conductance_s: &[f64]) -> f64 {
         // idle taxels are the least of all
@@ -61,9 +59,22 @@ impl WireReadout for Events {
         at_once.min(senders.max(1.0)) * Skin::default().pressed_s
     }
 
-    fn read(&self, wire: &mut WireSession<'_>) -> Result<Vec<Reading>, Refusal> {
+    fn start(&self) -> Box<dyn Reader + '_> {
+        Box::new(self)
+    }
+}
+
+impl Reader for &Events {
+    fn read(&mut self, wire: &mut WireSession<'_>) -> Result<Reading, Refusal> {
         let Skin { idle_s, pressed_s, .. } = wire.skin.electronics.skin;
         let (event_s, largest_s) = (EVENT * idle_s, LARGEST * pressed_s);
+        let mut image = vec![0.0; self.taxels];
+        // the longest signature that there is time for, in whole sixteens
+        let slots = wire.left().saturating_sub(SPREAD) / (1 + Message::BITS) / 16 * 16;
+        if slots < SLOTS[0] {
+            return Ok(Reading::of(image));
+        }
+        let message = Message::new(self.taxels, slots.min(SLOTS[1]), self.streams);
         let values = wire.own_values_s();
         let senders: Vec<Sender> = (0..self.taxels)
             .filter(|k| values[*k] > event_s)
@@ -74,26 +85,14 @@ impl WireReadout for Events {
             })
             .collect();
         let amplitude_v = pressed_s * wire.profile.volts_per_siemens();
-        let read = |message: &Message| {
-            let count = SPREAD + message.len();
-            let chips = (!senders.is_empty()).then(|| Patterns::new(count, message.chips(&senders, count)));
-            let chips = chips.transpose()?;
-            let frame = wire.transmissions(chips.as_ref(), count)?;
-            let samples: Vec<f64> = frame.volts.iter().map(|v| v / amplitude_v).collect();
-            let mut image = vec![0.0; self.taxels];
-            let found = receive(message, &samples);
-            for sender in &found {
-                image[sender.taxel] = conductance_s(sender.value, largest_s);
-            }
-            let noticed = frame.volts.iter().position(|v| v.abs() > frame.alarm_v);
-            Ok(Reading {
-                measurements: count,
-                image,
-                noticed: noticed.map(|first| first as f64 + 0.5),
-                placed: (!found.is_empty()).then_some((SPREAD + message.slots) as f64 - 0.5),
-            })
-        };
-        self.messages.iter().map(read).collect()
+        let count = SPREAD + message.len();
+        let chips = (!senders.is_empty()).then(|| Patterns::new(count, message.chips(&senders, count)));
+        let frame = wire.transmissions(chips.transpose()?.as_ref(), count)?;
+        let samples: Vec<f64> = frame.volts.iter().map(|v| v / amplitude_v).collect();
+        for sender in receive(&message, &samples) {
+            image[sender.taxel] = conductance_s(sender.value, largest_s);
+        }
+        Ok(Reading::of(image))
     }
 }
 
@@ -135,7 +134,7 @@ impl Message {
     /// Signatures of `taxels` taxels: in every sixteen of the `slots` slots one pulse of either sign, at random.
     fn new(taxels: usize, slots: usize, streams: Streams) -> Self {
         let signature = |taxel: usize| {
-            let mut rng = streams.child("readouts/signatures", slots as u64).rng("taxel", taxel as u64);
+            let mut rng = streams.child("bench/signatures", slots as u64).rng("taxel", taxel as u64);
             let pulse = |start: usize| {
                 let slot = start + usize::from(rng.random_range(0..16_u16));
                 (slot, if rng.random() { 1.0 } else { -1.0 })

@@ -1,0 +1,332 @@
+//! `spts bench`: the benchmark of few-wire touch.
+
+use crate::context::{Bars, Common, open_folder};
+use crate::error::CliError;
+use crate::options::seed;
+use clap::builder::{PossibleValuesParser, TypedValueParser};
+use clap::{Args, Subcommand, ValueEnum};
+use serde::Serialize;
+use spts::output::write_json;
+use spts::session::parse_json;
+use spts_input::Refusal;
+use spts_report::bench::{leaderboard_text, text, write_leaderboard};
+use spts_studies::bench::{Bench, Card, Choice, READOUTS, SUITE, Split, TASKS, Task, Track, task_named};
+use std::path::{Path, PathBuf};
+
+/// The benchmark of few-wire touch: fixed tasks, the same wire for all, a card for every entrant.
+///
+/// The suite touch-1 has fourteen tasks: images of shapes anywhere, classes, contacts at once, courses in time, drift,
+/// faults, up to 10,000 taxels. All touches follow from its seeds, so that nothing is downloaded. The protocol is
+/// docs/benchmark.md.
+#[derive(Debug, Args)]
+#[command(arg_required_else_help = true)]
+pub(super) struct BenchCommand {
+    #[command(subcommand)]
+    action: Action,
+}
+
+#[derive(Debug, Subcommand)]
+enum Action {
+    List(ListCommand),
+    Run(RunCommand),
+    Verify(VerifyCommand),
+    Table(TableCommand),
+}
+
+impl BenchCommand {
+    /// Runs the command.
+    pub(super) fn run(self) -> Result<(), CliError> {
+        match self.action {
+            Action::List(command) => command.run(),
+            Action::Run(command) => command.run(),
+            Action::Verify(command) => command.run(),
+            Action::Table(command) => command.run(),
+        }
+    }
+}
+
+/// Tasks of the suite, and who can take part by name.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  spts bench list
+  spts bench list --json")]
+struct ListCommand {
+    #[command(flatten)]
+    common: Common,
+}
+
+#[derive(Serialize)]
+struct Listed {
+    suite: &'static str,
+    tasks: Vec<ListedTask>,
+    entrants: Vec<(&'static str, Vec<String>)>,
+}
+
+#[derive(Serialize)]
+struct ListedTask {
+    name: &'static str,
+    about: &'static str,
+    taxels: usize,
+    measurements: &'static [usize],
+    more: &'static [usize],
+}
+
+impl ListCommand {
+    fn run(self) -> Result<(), CliError> {
+        self.common.start()?;
+        let tasks = TASKS.iter().map(|task| ListedTask {
+            name: task.name,
+            about: task.about,
+            taxels: task.side * task.side,
+            measurements: task.measurements,
+            more: task.more,
+        });
+        let entrants = Track::ALL.map(|track| (track.name(), Choice::names(track)));
+        let listed = Listed { suite: SUITE, tasks: tasks.collect(), entrants: entrants.into() };
+        let text = || {
+            let mut out = format!("suite {SUITE}\n\n");
+            for task in &listed.tasks {
+                let numbers = |of: &[usize]| of.iter().map(usize::to_string).collect::<Vec<_>>().join(", ");
+                out.push_str(&format!(
+                    "  {:15} {} ({} taxels; {} measurements, readouts also {})\n",
+                    task.name,
+                    task.about,
+                    task.taxels,
+                    numbers(task.measurements),
+                    numbers(task.more)
+                ));
+            }
+            for (track, names) in &listed.entrants {
+                out.push_str(&format!("\ntrack {track}: {}\n", names.join(", ")));
+            }
+            out.push_str("\nreadouts:\n");
+            for line in READOUTS {
+                out.push_str(&format!("  {:19} {}\n", line.name, line.about));
+            }
+            out
+        };
+        self.common.print(&listed, text)
+    }
+}
+
+/// What an entrant decides.
+#[derive(Debug, Clone, Copy, ValueEnum)]
+enum TrackName {
+    /// Images or classes from given rows
+    Decoder,
+    /// Rows of ±1 too
+    Rows,
+    /// What is measured
+    Readout,
+}
+
+impl From<TrackName> for Track {
+    fn from(name: TrackName) -> Self {
+        match name {
+            TrackName::Decoder => Self::Decoder,
+            TrackName::Rows => Self::Rows,
+            TrackName::Readout => Self::Readout,
+        }
+    }
+}
+
+/// Scores an entrant and leaves its card.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  spts bench run auto --quick
+  spts bench run amortised --save cards/amortised.json
+  spts bench run binary_search --tasks small,contacts_10
+  spts bench run mine.py --quick --save cards/mine.json
+  spts bench run 'mine=./my_decoder --fast' --tasks thin")]
+struct RunCommand {
+    /// An entrant by its name (spts bench list), a Python file with a class, or a program in quotes
+    #[arg(value_name = "NAME|FILE.py|PROGRAM")]
+    who: String,
+    /// Track, for a name that several have [default: the first that has it]
+    #[arg(long)]
+    track: Option<TrackName>,
+    /// Tasks [default: all]
+    #[arg(long, value_delimiter = ',', value_name = "TASK,…", value_parser = known_task())]
+    tasks: Vec<&'static Task>,
+    /// Few touches, a minute
+    #[arg(long)]
+    quick: bool,
+    /// The touches for development, whose truth may be seen, in place of those for scores
+    #[arg(long, conflicts_with = "seed")]
+    public: bool,
+    /// Touches of a seed of your own in place of the suite's [default: none]
+    #[arg(long, value_name = "SEED", value_parser = seed)]
+    seed: Option<u64>,
+    /// File of the card [default: none]
+    #[arg(long, value_name = "FILE")]
+    save: Option<PathBuf>,
+    #[command(flatten)]
+    common: Common,
+}
+
+fn known_task() -> impl TypedValueParser<Value = &'static Task> {
+    PossibleValuesParser::new(TASKS.iter().map(|task| task.name))
+        .map(|name: String| task_named(&name).unwrap_or(&TASKS[0]))
+}
+
+/// The entrant that `who` names.
+fn choice(who: &str, track: Option<Track>) -> Result<Choice, Refusal> {
+    let named = Choice::named(who, track);
+    let program = who.split_whitespace().nth(1).is_some() || who.contains('=') || Path::new(who).is_file();
+    match named {
+        Err(_) if who.ends_with(".py") && !who.contains(' ') => {
+            if !Path::new(who).is_file() {
+                return Err(Refusal::new("no such file").at(who));
+            }
+            Ok(Choice::python(Path::new(who)))
+        }
+        Err(_) if program => Ok(Choice::program(who)),
+        other => other,
+    }
+}
+
+impl RunCommand {
+    fn run(self) -> Result<(), CliError> {
+        self.common.start()?;
+        let bench = Bench::new(choice(&self.who, self.track.map(Track::from))?);
+        let tasks = if self.tasks.is_empty() { bench.tasks.clone() } else { self.tasks };
+        let split = match (self.public, self.seed) {
+            (true, _) => Split::Public,
+            (false, Some(seed)) => Split::Fresh(seed),
+            (false, None) => Split::Test,
+        };
+        let card = Bench { tasks, split, quick: self.quick, ..bench }.run(&Bars::default())?;
+        if let Some(file) = &self.save {
+            if let Some(folder) = file.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+                std::fs::create_dir_all(folder).map_err(|e| Refusal::from_error(e).at(folder.display()))?;
+            }
+            write_json(file, &card)?;
+        }
+        self.common.print(&card, || text(&card))
+    }
+}
+
+fn read(file: &Path) -> Result<Card, Refusal> {
+    let text = spts_input::read_text(file, MOST_BYTES)?;
+    parse_json(file, &text)
+}
+
+/// Largest card, bytes.
+const MOST_BYTES: u64 = 10_000_000;
+
+/// Runs the entrant of a card again and compares.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  spts bench verify cards/amortised.json
+  spts bench verify cards/mine.json --seed 12345")]
+struct VerifyCommand {
+    /// The card
+    #[arg(value_name = "CARD.json")]
+    card: PathBuf,
+    /// Touches of this seed, which the entrant cannot have seen: the points have to agree within their intervals
+    /// [default: the touches of the card, and the scores have to be equal]
+    #[arg(long, value_name = "SEED", value_parser = seed)]
+    seed: Option<u64>,
+    #[command(flatten)]
+    common: Common,
+}
+
+#[derive(Serialize)]
+struct Verified {
+    card: Card,
+    again: Card,
+}
+
+impl VerifyCommand {
+    fn run(self) -> Result<(), CliError> {
+        self.common.start()?;
+        let card = read(&self.card)?;
+        let who = match &card.command {
+            Some(command) => choice(command, Some(card.track))?,
+            None => Choice::named(&card.entrant, Some(card.track))?,
+        };
+        let tasks = card.tasks.iter().map(|task| {
+            task_named(&task.task).ok_or_else(|| Refusal::new(format!("{SUITE} has no task {:?}", task.task)))
+        });
+        let tasks = tasks.collect::<Result<Vec<_>, Refusal>>().map_err(|e| e.at(self.card.display()))?;
+        let split = match (self.seed, card.split.as_str()) {
+            (Some(seed), _) => Split::Fresh(seed),
+            (None, "public") => Split::Public,
+            (None, split) => split.strip_prefix("fresh ").and_then(|n| n.parse().ok()).map_or(Split::Test, Split::Fresh),
+        };
+        let again = Bench { choice: who, tasks, split, quick: card.quick }.run(&Bars::default())?;
+        if self.seed.is_none() {
+            card.same(&again).map_err(|e| e.at(self.card.display()))?;
+        } else if again.points.high < card.points.low {
+            let problem = format!(
+                "`points`: the card has {:.1} ({:.1} – {:.1}); on touches that nobody has seen it is {:.1} ({:.1} – {:.1})",
+                card.points.mean, card.points.low, card.points.high, again.points.mean, again.points.low, again.points.high
+            );
+            return Err(Refusal::new(problem).at(self.card.display()).into());
+        }
+        let how = if self.seed.is_none() { "equal" } else { "within the intervals" };
+        let verified = Verified { card, again };
+        let text = || {
+            let [a, b] = [&verified.card, &verified.again].map(|card| card.points.mean);
+            format!("{}: {how}: {a:.1} points on the card, {b:.1} run again", self.card.display())
+        };
+        self.common.print(&verified, text)
+    }
+}
+
+/// Makes a leaderboard of cards.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  spts bench table cards/
+  spts bench table cards/amortised.json cards/mine.json --out out/leaderboard
+
+Files in DIR:
+  index.html                 the leaderboard as a page
+  tables/leaderboard.csv     a line a card; cards.json the cards
+  figures/                   scores over the number of measurements, a file a track, .svg and .png")]
+struct TableCommand {
+    /// Cards, or folders of them
+    #[arg(value_name = "CARDS", required = true)]
+    cards: Vec<PathBuf>,
+    /// Folder of the results
+    #[arg(long, value_name = "DIR", default_value = "out/bench")]
+    out: PathBuf,
+    #[command(flatten)]
+    common: Common,
+}
+
+impl TableCommand {
+    fn run(self) -> Result<(), CliError> {
+        self.common.start()?;
+        let mut files = Vec::new();
+        for path in &self.cards {
+            if path.is_dir() {
+                let entries = std::fs::read_dir(path).map_err(|e| Refusal::from_error(e).at(path.display()))?;
+                let own = entries.filter_map(|entry| Some(entry.ok()?.path()));
+                let mut own: Vec<PathBuf> = own.filter(|file| file.extension().is_some_and(|e| e == "json")).collect();
+                own.sort();
+                if own.is_empty() {
+                    return Err(Refusal::new("no card (*.json)").at(path.display()).into());
+                }
+                files.extend(own);
+            } else {
+                files.push(path.clone());
+            }
+        }
+        let cards = files.iter().map(|file| read(file)).collect::<Result<Vec<Card>, Refusal>>()?;
+        let like = |card: &Card| (card.suite.clone(), card.split.clone(), card.quick);
+        if let Some((file, other)) = files.iter().zip(&cards).find(|(_, card)| like(card) != like(&cards[0])) {
+            let (suite, split, quick) = like(other);
+            let problem = format!(
+                "`suite`, `split`, `quick` = {suite}, {split}, {quick}; valid: those of {}, {:?}",
+                files[0].display(),
+                like(&cards[0])
+            );
+            return Err(Refusal::new(problem).at(file.display()).into());
+        }
+        let out = open_folder(&self.out)?;
+        write_leaderboard(&cards, out)?;
+        let text = || format!("{}page: {}", leaderboard_text(&cards), self.out.join("index.html").display());
+        self.common.print(&cards, text)
+    }
+}

@@ -1,0 +1,123 @@
+//! What an entrant has got: the card that it leaves, and how two cards compare.
+
+use super::{Subject, Track};
+use serde::{Deserialize, Serialize};
+use spts_input::Refusal;
+
+/// A mean with its 95 % interval over skins and touches.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+pub struct Interval {
+    /// Mean.
+    pub mean: f64,
+    /// 2.5th percentile.
+    pub low: f64,
+    /// 97.5th percentile.
+    pub high: f64,
+}
+
+/// One task with answers of so many measurements.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Entry {
+    /// Measurements for an answer.
+    pub measurements: usize,
+    /// Mean score: intersection over union, or the share of right classes or places.
+    pub score: Interval,
+}
+
+/// An entrant on one task.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct TaskCard {
+    /// Name.
+    pub task: String,
+    /// What is scored.
+    pub subject: Subject,
+    /// SHA-256 of the touches.
+    pub data_sha256: String,
+    /// Touches that are scored.
+    pub touches: usize,
+    /// Score of an answer by all there is to measure.
+    pub ceiling: f64,
+    /// Score of an answer that measures nothing.
+    pub floor: f64,
+    /// Scores, one for every number of measurements.
+    pub entries: Vec<Entry>,
+    /// 100 · (score − floor) / (ceiling − floor), in [0, 100], mean over the numbers of measurements.
+    pub points: Interval,
+    /// Why the entrant has no answer to this task; its points are 0.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub refused: Option<String>,
+}
+
+/// What an entrant has got on a suite.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Card {
+    /// Name of the suite.
+    pub suite: String,
+    /// Name of the entrant.
+    pub entrant: String,
+    /// What it decided.
+    pub track: Track,
+    /// `test`, `public`, or `fresh` with the seed.
+    pub split: String,
+    /// Whether few touches were scored.
+    pub quick: bool,
+    /// Whether all tasks were done on all touches of the test split, and these are those of the suite's release.
+    pub official: bool,
+    /// Mean of the points over the tasks.
+    pub points: Interval,
+    /// The tasks.
+    pub tasks: Vec<TaskCard>,
+    /// Version of this program, and the revision of its sources.
+    pub version: [String; 2],
+    /// The command of a program.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub command: Option<String>,
+    /// SHA-256 of the file of a program, if it has one.
+    #[serde(skip_serializing_if = "Option::is_none", default)]
+    pub program_sha256: Option<String>,
+    /// Median time from samples to answer, µs, one a task; of the machine below, and compared with nothing.
+    pub times_us: Vec<f64>,
+    /// Processor, platform and number of threads.
+    pub machine: [String; 3],
+}
+
+impl Card {
+    /// The first difference from `again`, which was made by the same entrant, in what does not depend on the machine.
+    ///
+    /// # Errors
+    /// [`Refusal`] that names it.
+    pub fn same(&self, again: &Self) -> Result<(), Refusal> {
+        let differs = |what: &str, a: &dyn std::fmt::Display, b: &dyn std::fmt::Display| {
+            Err(Refusal::new(format!("`{what}`: the card has {a}; run again it is {b}")))
+        };
+        if self.suite != again.suite {
+            return differs("suite", &self.suite, &again.suite);
+        }
+        if self.program_sha256 != again.program_sha256 {
+            let text = |sum: &Option<String>| sum.clone().unwrap_or_else(|| "none".to_owned());
+            return differs("program_sha256", &text(&self.program_sha256), &text(&again.program_sha256));
+        }
+        if self.tasks.len() != again.tasks.len() {
+            return differs("tasks", &self.tasks.len(), &again.tasks.len());
+        }
+        for (a, b) in self.tasks.iter().zip(&again.tasks) {
+            let at = |what: &str| format!("{}.{what}", a.task);
+            if a.data_sha256 != b.data_sha256 {
+                return differs(&at("data_sha256"), &a.data_sha256, &b.data_sha256);
+            }
+            for (mine, other) in a.entries.iter().zip(&b.entries) {
+                if mine != other {
+                    let what = at(&format!("score at {} measurements", mine.measurements));
+                    return differs(&what, &mine.score.mean, &other.score.mean);
+                }
+            }
+            if a != b {
+                return differs(&at("points"), &a.points.mean, &b.points.mean);
+            }
+        }
+        if self.points != again.points {
+            return differs("points", &self.points.mean, &again.points.mean);
+        }
+        Ok(())
+    }
+}
