@@ -36,7 +36,7 @@ RUNS = {
     "courses": "dataset make courses --rows 40 --out {out}",
     "skins": "dataset make skins --rows 20 --out {out}",
     "budget": "budget --quick --objects T,tape --measurements 20 --out {out}",
-    "readouts": "readouts --quick --taxels 100 --out {out}",
+    "bench": "bench data drift --out {out}",
     "fidelity": "fidelity --scene T --cells 3 --out {out}",
     "circuit": "circuit --taxels 100 --out {out}",
     "design": "design --area 0.15x0.15 --resolution 15mm --latency 2ms --iou 0.7 --objects large --out {out}",

@@ -231,12 +231,14 @@ fidelity --scene missing.toml | missing.toml
 fidelity --scene T --scene T | twice
 fidelity --cells 0 | [1, 24]
 fidelity --cells x | --cells
-readouts --taxels 65 | `--taxels` = 65 | [64, 16384]
-readouts --taxels 1000000 | `--taxels` = 1000000 | [64, 16384]
-readouts --readout magic | --readout | magic | raster
-readouts --repetitions 0 | `--repetitions` = 0 | [1, 1000]
-readouts --shapes 0 | `--shapes` = 0 | [1, 1000]
-readouts --seed -1 | `--seed` = -1
+bench run magic | magic | valid: auto
+bench run auto --tasks big | --tasks | big | small
+bench run auto --track rows | auto | valid: random, cosine_signs
+bench run missing.py | missing.py | no such file
+bench run auto --seed -1 | `--seed` = -1
+bench verify missing.json | missing.json
+bench table missing | missing
+bench data big | big | small
 circuit --pressed-us nan | --pressed-us | nan | [0, 1e6] µS
 circuit --bus-pf -1 | --bus-pf | -1 | [0, 1e6] pF
 circuit --taxel-pf inf | --taxel-pf | inf | [0, 1e6] pF

@@ -1,16 +1,20 @@
 //! `spts bench`: the benchmark of few-wire touch.
 
-use crate::context::{Bars, Common, open_folder};
+use crate::context::{Bars, Common, open_folder, spinner};
 use crate::error::CliError;
 use crate::options::seed;
+use crate::score::read_board;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Subcommand, ValueEnum};
 use serde::Serialize;
-use spts::output::write_json;
+use spts::output::{write_json, write_npy};
 use spts::session::parse_json;
 use spts_input::Refusal;
-use spts_report::bench::{leaderboard_text, text, write_leaderboard};
-use spts_studies::bench::{Bench, Card, Choice, READOUTS, SUITE, Split, TASKS, Task, Track, task_named};
+use spts_report::bench::{leaderboard_text, ranking_text, text, write_leaderboard};
+use spts_report::write_all_or_none;
+use spts_studies::bench::{
+    Bench, Card, Choice, Development, READOUTS, Ranking, SUITE, Split, TASKS, Task, Track, task_named,
+};
 use std::path::{Path, PathBuf};
 
 /// The benchmark of few-wire touch: fixed tasks, the same wire for all, a card for every entrant.
@@ -28,6 +32,7 @@ pub(super) struct BenchCommand {
 #[derive(Debug, Subcommand)]
 enum Action {
     List(ListCommand),
+    Data(DataCommand),
     Run(RunCommand),
     Verify(VerifyCommand),
     Table(TableCommand),
@@ -38,6 +43,7 @@ impl BenchCommand {
     pub(super) fn run(self) -> Result<(), CliError> {
         match self.action {
             Action::List(command) => command.run(),
+            Action::Data(command) => command.run(),
             Action::Run(command) => command.run(),
             Action::Verify(command) => command.run(),
             Action::Table(command) => command.run(),
@@ -109,6 +115,57 @@ impl ListCommand {
     }
 }
 
+/// Writes touches of the public split with their samples and their truth, for the development of a decoder.
+#[derive(Debug, Args)]
+#[command(after_help = "Examples:
+  spts bench data thin --out out/thin
+  python3 -c 'import numpy; print(numpy.load(\"out/thin/y.npy\").shape)'
+
+Files in DIR:
+  phi.npy                    rows of the sensing matrix, M x taxels; fewer measurements are the first of them
+  y.npy                      samples, touches x M, \u{b5}S: y = phi x and noise
+  images.npy                 true conductances x, touches x taxels, \u{b5}S
+  names.json                 object or family of every touch")]
+struct DataCommand {
+    /// Task
+    #[arg(value_name = "TASK", value_parser = known_task())]
+    task: &'static Task,
+    /// Folder of the arrays
+    #[arg(long, value_name = "DIR", default_value = "out/bench_data")]
+    out: PathBuf,
+    #[command(flatten)]
+    common: Common,
+}
+
+#[derive(Serialize)]
+struct Written {
+    task: &'static str,
+    touches: usize,
+    taxels: usize,
+    measurements: usize,
+}
+
+impl DataCommand {
+    fn run(self) -> Result<(), CliError> {
+        self.common.start()?;
+        let out = open_folder(&self.out)?;
+        let wait = spinner("pressing touches");
+        let Development { phi, y, images, names } = Development::of(self.task)?;
+        drop(wait);
+        write_all_or_none(out, |out| {
+            for (name, array) in [("phi.npy", &phi), ("y.npy", &y), ("images.npy", &images)] {
+                write_npy(&out.path(name), &[array.nrows(), array.ncols()], array.view().values())?;
+            }
+            write_json(&out.path("names.json"), &names)
+        })?;
+        let (touches, taxels, measurements) = (names.len(), phi.ncols(), phi.nrows());
+        let written = Written { task: self.task.name, touches, taxels, measurements };
+        let text =
+            || format!("{touches} touches of {taxels} taxels, {measurements} measurements: {}", self.out.display());
+        self.common.print(&written, text)
+    }
+}
+
 /// What an entrant decides.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum TrackName {
@@ -142,7 +199,8 @@ struct RunCommand {
     /// An entrant by its name (spts bench list), a Python file with a class, or a program in quotes
     #[arg(value_name = "NAME|FILE.py|PROGRAM")]
     who: String,
-    /// Track, for a name that several have [default: the first that has it]
+    /// Track, for a name that several have, or a program [default: the first that has it; of a class in Python that of
+    /// its methods; of a program decoder]
     #[arg(long)]
     track: Option<TrackName>,
     /// Tasks [default: all]
@@ -178,9 +236,9 @@ fn choice(who: &str, track: Option<Track>) -> Result<Choice, Refusal> {
             if !Path::new(who).is_file() {
                 return Err(Refusal::new("no such file").at(who));
             }
-            Ok(Choice::python(Path::new(who)))
+            Choice::python(Path::new(who), track)
         }
-        Err(_) if program => Ok(Choice::program(who)),
+        Err(_) if program => Ok(Choice::program(who, track)),
         other => other,
     }
 }
@@ -207,7 +265,7 @@ impl RunCommand {
 }
 
 fn read(file: &Path) -> Result<Card, Refusal> {
-    let text = spts_input::read_text(file, MOST_BYTES)?;
+    let text = spts_input::read_text(file, MOST_BYTES).map_err(|e| Refusal::from_error(e).at(file.display()))?;
     parse_json(file, &text)
 }
 
@@ -252,17 +310,24 @@ impl VerifyCommand {
         let split = match (self.seed, card.split.as_str()) {
             (Some(seed), _) => Split::Fresh(seed),
             (None, "public") => Split::Public,
-            (None, split) => split.strip_prefix("fresh ").and_then(|n| n.parse().ok()).map_or(Split::Test, Split::Fresh),
+            (None, split) => {
+                split.strip_prefix("fresh ").and_then(|n| n.parse().ok()).map_or(Split::Test, Split::Fresh)
+            }
         };
         let again = Bench { choice: who, tasks, split, quick: card.quick }.run(&Bars::default())?;
         if self.seed.is_none() {
-            card.same(&again).map_err(|e| e.at(self.card.display()))?;
+            card.same(&again).map_err(|e| CliError::Differs(e.at(self.card.display()).to_string()))?;
         } else if again.points.high < card.points.low {
             let problem = format!(
                 "`points`: the card has {:.1} ({:.1} – {:.1}); on touches that nobody has seen it is {:.1} ({:.1} – {:.1})",
-                card.points.mean, card.points.low, card.points.high, again.points.mean, again.points.low, again.points.high
+                card.points.mean,
+                card.points.low,
+                card.points.high,
+                again.points.mean,
+                again.points.low,
+                again.points.high
             );
-            return Err(Refusal::new(problem).at(self.card.display()).into());
+            return Err(CliError::Differs(Refusal::new(problem).at(self.card.display()).to_string()));
         }
         let how = if self.seed.is_none() { "equal" } else { "within the intervals" };
         let verified = Verified { card, again };
@@ -279,6 +344,7 @@ impl VerifyCommand {
 #[command(after_help = "Examples:
   spts bench table cards/
   spts bench table cards/amortised.json cards/mine.json --out out/leaderboard
+  spts bench table cards/ --real board.json
 
 Files in DIR:
   index.html                 the leaderboard as a page
@@ -288,11 +354,22 @@ struct TableCommand {
     /// Cards, or folders of them
     #[arg(value_name = "CARDS", required = true)]
     cards: Vec<PathBuf>,
+    /// A board that `spts score DIR --left-out --save BOARD` wrote of recordings: whether its decoders rank there as on
+    /// the tasks [default: none]
+    #[arg(long, value_name = "BOARD.json")]
+    real: Option<PathBuf>,
     /// Folder of the results
     #[arg(long, value_name = "DIR", default_value = "out/bench")]
     out: PathBuf,
     #[command(flatten)]
     common: Common,
+}
+
+#[derive(Serialize)]
+struct Ranked {
+    cards: Vec<Card>,
+    #[serde(skip_serializing_if = "Option::is_none")]
+    ranking: Option<Ranking>,
 }
 
 impl TableCommand {
@@ -324,9 +401,15 @@ impl TableCommand {
             );
             return Err(Refusal::new(problem).at(file.display()).into());
         }
+        let board = self.real.as_deref().map(read_board).transpose()?;
+        let ranking = board.map(|board| Ranking::new(&cards, &board)).transpose()?;
         let out = open_folder(&self.out)?;
-        write_leaderboard(&cards, out)?;
-        let text = || format!("{}page: {}", leaderboard_text(&cards), self.out.join("index.html").display());
-        self.common.print(&cards, text)
+        write_leaderboard(&cards, ranking.as_ref(), out)?;
+        let ranked = Ranked { cards, ranking };
+        let text = || {
+            let ranking = ranked.ranking.as_ref().map_or_else(String::new, ranking_text);
+            format!("{}{ranking}page: {}", leaderboard_text(&ranked.cards), self.out.join("index.html").display())
+        };
+        self.common.print(&ranked, text)
     }
 }

@@ -426,10 +426,9 @@ impl ScoreCommand {
         } else {
             decoders_named(&self.decoder, None)?
         };
-        let external = self.external.iter().map(|text| ExternalCommand {
-            limit: Duration::from_secs_f64(self.external_timeout),
-            ..ExternalCommand::parse(text)
-        });
+        let limit = Duration::from_secs_f64(self.external_timeout);
+        let external =
+            self.external.iter().map(|text| ExternalCommand { limit, first: limit, ..ExternalCommand::parse(text) });
         let external: Vec<Arc<dyn Contender>> = external.map(|e| Arc::new(e) as Arc<dyn Contender>).collect();
         let names = decoders.iter().map(|d| d.name).chain(external.iter().map(|e| e.name()));
         let names: Vec<&str> = names.collect();
@@ -543,7 +542,7 @@ fn any_board(path: &Path) -> Result<ScoreBoard, CliError> {
 }
 
 /// The board in a file that `--save` wrote, scored as this program scores.
-fn read_board(path: &Path) -> Result<ScoreBoard, CliError> {
+pub(crate) fn read_board(path: &Path) -> Result<ScoreBoard, CliError> {
     let board = any_board(path)?;
     if board.version != ScoreBoard::VERSION {
         let problem = format!(

@@ -6,7 +6,7 @@ use crate::html::{Page, PageFigure, PageTable, Section, html};
 use spts::output::{OutputFolder, write_bytes, write_json};
 use spts_eval::{Table, unique};
 use spts_input::Refusal;
-use spts_studies::bench::{Card, Entry, Interval, TASKS, TaskCard, Track};
+use spts_studies::bench::{Card, Entry, Interval, Ranked, Ranking, TASKS, TaskCard, Track};
 
 /// A line of a card: a task with one number of measurements, and the time of its answers, µs.
 type Line<'a> = (&'a TaskCard, &'a Entry, f64);
@@ -89,11 +89,29 @@ pub fn leaderboard_text(cards: &[Card]) -> String {
     out
 }
 
+fn ranking_table(ranking: &Ranking) -> Table<'_, &Ranked> {
+    Table::new("ranking", &ranking.decoders)
+        .column("entrant", "decoder", |d: &Ranked| &d.entrant)
+        .column("iou", "IoU on recordings, left out", |d| d.iou)
+        .digits(3)
+        .file("worst_iou", |d| d.worst.1)
+        .file("worst_object", |d| &d.worst.0)
+        .shown("worst", |d| format!("{} {:.2}", d.worst.0, d.worst.1))
+        .column("points", "points of small, thin, broad", |d| d.points)
+        .digits(1)
+}
+
+/// Two rankings in words.
+pub fn ranking_text(ranking: &Ranking) -> String {
+    let tau = shown(&ranking.tau, 2);
+    format!("{}Kendall's τ of both rankings, interval over the objects: {tau}\n", ranking_table(ranking).text())
+}
+
 /// Writes `index.html`, `cards.json`, `tables/leaderboard.csv` and the figures into the folder `out`.
 ///
 /// # Errors
 /// [`Refusal`] when a file cannot be written.
-pub fn write_leaderboard(cards: &[Card], out: OutputFolder) -> Result<(), Refusal> {
+pub fn write_leaderboard(cards: &[Card], ranking: Option<&Ranking>, out: OutputFolder) -> Result<(), Refusal> {
     write_all_or_none(out, |out| {
         let all: Vec<&Card> = Track::ALL.into_iter().flat_map(|track| ranked(cards, track)).collect();
         leaderboard(&all).write_csv(&out.folder("tables")?.join("leaderboard.csv"))?;
@@ -116,12 +134,24 @@ pub fn write_leaderboard(cards: &[Card], out: OutputFolder) -> Result<(), Refusa
                 tables: vec![PageTable::new("Points", &leaderboard(&own), "leaderboard")],
             });
         }
+        if let Some(ranking) = ranking {
+            let table = ranking_table(ranking);
+            table.write_csv(&out.path("tables/ranking.csv"))?;
+            sections.push(Section {
+                id: "ranking".to_owned(),
+                title: "Decoders on recordings of a real skin".to_owned(),
+                lead: format!("Kendall's τ of both rankings: {}.", shown(&ranking.tau, 2)),
+                tables: vec![PageTable::new("The best on the recordings first", &table, "ranking")],
+                ..Section::default()
+            });
+        }
         let suites = unique(cards.iter().map(|card| card.suite.as_str())).join(", ");
         let page = Page {
             title: format!("Few-wire touch: {suites}"),
-            summary: "100 points: as good as by all there is to measure; 0: as good as by nothing. A point of a task is a \
+            summary:
+                "100 points: as good as by all there is to measure; 0: as good as by nothing. A point of a task is a \
                       hundredth of the way between both, mean over the numbers of measurements."
-                .to_owned(),
+                    .to_owned(),
             sections,
             ..Page::default()
         };

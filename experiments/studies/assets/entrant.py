@@ -1,39 +1,68 @@
-"""Speaks for a class in a Python file: a line of JSON in, a line out."""
+"""Speaks for a class in a Python file: a line of JSON in, a line out (docs/benchmark.md)."""
+
 import importlib.util
 import json
 import sys
 from types import SimpleNamespace
 
-import numpy as np
+try:
+    import numpy as np
+except ImportError:
+    sys.exit(f"{sys.executable} has no NumPy: pip install numpy")
 
 
-def rows_of(lines):
-    """Rows of signs or numbers as an array."""
-    if lines and isinstance(lines[0], str):
-        return np.array([[1.0 if sign == "+" else -1.0 for sign in line] for line in lines])
-    return np.asarray(lines, float)
+def say(**answer):
+    """One line out."""
+    print(json.dumps(answer), file=OUT, flush=True)
 
 
+def levels(lines):
+    """Rows of signs or numbers as an array, M × N."""
+    signs = lines and isinstance(lines[0], str)
+    return np.array([[1.0 if sign == "+" else -1.0 for sign in line] for line in lines] if signs else lines, float)
+
+
+def measured(rows):
+    """Samples at rows of levels, which are measured now."""
+    rows = np.atleast_2d(np.asarray(rows, float))
+    signs = np.isin(rows, (-1, 0, 1)).all()
+    say(measure=["".join("-0+"[int(w) + 1] for w in row) for row in rows] if signs else rows.tolist())
+    return np.array(json.loads(sys.stdin.readline())["y"])
+
+
+def answered(answer):
+    """An image, or an image and a name."""
+    image, name = answer if isinstance(answer, tuple) else (answer, None)
+    image = np.asarray(image, float).ravel().tolist()
+    say(image=image, **({} if name is None else {"label": NUMBERS[name]}))
+
+
+OUT, sys.stdout = sys.stdout, sys.stderr  # what the class prints is no answer
 spec = importlib.util.spec_from_file_location("entrant", sys.argv[1])
 module = importlib.util.module_from_spec(spec)
 spec.loader.exec_module(module)
-own = [v for v in vars(module).values() if isinstance(v, type) and v.__module__ == "entrant" and hasattr(v, "predict")]
-if len(own) != 1:
-    sys.exit(f"{sys.argv[1]}: {len(own)} classes with a method `predict`; valid: 1")
-entrant = own[0]()
-answers, sys.stdout = sys.stdout, sys.stderr
+classes = [v for v in vars(module).values() if isinstance(v, type) and v.__module__ == "entrant"]
+classes = [v for v in classes if hasattr(v, "predict") or hasattr(v, "read")]
+if len(classes) != 1:
+    sys.exit(f"{sys.argv[1]}: {len(classes)} classes with a method `predict` or `read`; valid: 1")
+entrant = classes[0]()
 header = json.loads(sys.stdin.readline())
 names = {int(number): name for number, name in header["classes"].items()}
-images, labels = header["learn"]["images"], header["learn"]["labels"]
-train = SimpleNamespace(images=np.asarray(images, float), labels=[names.get(k) for k in labels], rows=header["rows"], cols=header["cols"])
+NUMBERS = {name: number for number, name in names.items()}
+train = SimpleNamespace(
+    images=np.array(header["learn"]["images"], float),
+    labels=[names.get(number) for number in header["learn"]["labels"]],
+    rows=header["rows"],
+    cols=header["cols"],
+    measurements=header["measurements"],
+)
 if hasattr(entrant, "fit"):
     entrant.fit(train)
-numbers = {name: number for number, name in names.items()}
 for line in sys.stdin:
-    window = json.loads(line)
-    answer = entrant.predict(rows_of(window["phi"]), np.asarray(window["y"], float))
-    image, label = answer if isinstance(answer, tuple) else (answer, None)
-    said = {"image": np.asarray(image, float).ravel().tolist()}
-    if label is not None:
-        said["label"] = numbers[label]
-    print(json.dumps(said), file=answers, flush=True)
+    asked = json.loads(line)
+    if "rows" in asked:
+        say(rows=["".join("+" if w > 0 else "-" for w in row) for row in np.asarray(entrant.rows(asked["rows"]))])
+    elif "read" in asked:
+        answered(entrant.read(measured, asked["read"]))
+    else:
+        answered(entrant.predict(levels(asked["phi"]), np.array(asked["y"], float)))

@@ -1,6 +1,7 @@
 //! Studies of the twin. Each module computes a report of its own type; none draws, prints or writes files.
 
 pub mod arm;
+pub mod bench;
 pub mod budget;
 pub mod calibrate;
 pub mod compare;
@@ -11,7 +12,6 @@ pub mod fidelity;
 pub mod firmware;
 pub mod frames;
 pub mod per_object;
-pub mod bench;
 pub mod sensing;
 pub mod tolerances;
 pub mod touches;

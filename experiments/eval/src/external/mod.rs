@@ -37,6 +37,8 @@ pub struct ExternalCommand {
     /// Time limit for the answer to a window, and for the end after the last answer. Range:
     /// [`ExternalCommand::LIMIT_S`].
     pub limit: Duration,
+    /// Time limit for the first answer, which a program may have to learn for.
+    pub first: Duration,
 }
 
 impl ExternalCommand {
@@ -49,7 +51,36 @@ impl ExternalCommand {
     pub fn parse(text: &str) -> Self {
         let is_name = |s: &str| !s.is_empty() && s.chars().all(|c| c.is_alphanumeric() || "-_".contains(c));
         let (name, command) = text.split_once('=').filter(|(name, _)| is_name(name)).unwrap_or((text, text));
-        Self { name: name.to_owned(), command: command.to_owned(), limit: Self::DEFAULT_LIMIT }
+        let (limit, first) = (Self::DEFAULT_LIMIT, Self::DEFAULT_LIMIT);
+        Self { name: name.to_owned(), command: command.to_owned(), limit, first }
+    }
+}
+
+impl ExternalCommand {
+    /// Starts the program with its header, which has `more` entries of its own beside the usual ones. An answer has at
+    /// most `values` numbers.
+    ///
+    /// # Errors
+    /// [`Refusal`] if it cannot be started.
+    pub fn begin(
+        &self,
+        data: &TrainingData,
+        labels: &Labels,
+        left_out: Option<&str>,
+        more: &serde_json::Map<String, serde_json::Value>,
+        values: usize,
+    ) -> Result<External, Refusal> {
+        let valid = Valid::new(data, labels, left_out);
+        let ([rows, cols], images) = (data.shape, data.library.images());
+        let images: Vec<Vec<f64>> = (0..images.ncols()).map(|k| images.column(k)).collect();
+        let mut header = json!({
+            "taxels": valid.taxels, "rows": rows, "cols": cols, "left_out": left_out, "classes": valid.classes,
+            "learn": {"images": images, "labels": data.library.labels()},
+        });
+        if let Some(header) = header.as_object_mut() {
+            header.extend(more.clone());
+        }
+        Ok(External(Mutex::new(Stream::start(self, valid, &header, values)?)))
     }
 }
 
@@ -59,19 +90,41 @@ impl Contender for ExternalCommand {
     }
 
     fn learn(&self, data: &TrainingData, labels: &Labels, left_out: Option<&str>) -> Result<Arc<dyn Trained>, Refusal> {
-        let valid = Valid::new(data, labels, left_out);
-        let ([rows, cols], images) = (data.shape, data.library.images());
-        let images: Vec<Vec<f64>> = (0..images.ncols()).map(|k| images.column(k)).collect();
-        let header = json!({
-            "taxels": valid.taxels, "rows": rows, "cols": cols, "left_out": left_out, "classes": valid.classes,
-            "learn": {"images": images, "labels": data.library.labels()},
-        });
-        Ok(Arc::new(External(Mutex::new(Stream::start(self, valid, &header)?))))
+        Ok(Arc::new(self.begin(data, labels, left_out, &serde_json::Map::new(), data.images.nrows())?))
     }
 }
 
 /// A program at work, asked by all threads in turn.
-struct External(Mutex<Stream>);
+pub struct External(Mutex<Stream>);
+
+impl External {
+    /// Sends `question` as a line, and reads the line that answers it.
+    ///
+    /// # Errors
+    /// [`Refusal`] of a program that does not answer, or not with JSON.
+    pub fn ask(&self, question: &serde_json::Value) -> Result<serde_json::Value, Refusal> {
+        let mut stream = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        if let Some(failure) = &stream.failure {
+            return Err(failure.clone());
+        }
+        let answer = stream.exchange(question).and_then(|line| {
+            let text = String::from_utf8_lossy(&line).into_owned();
+            serde_json::from_str(&text).map_err(|e| stream.refused(&stream.window(), &format!("no JSON ({e})")))
+        });
+        if let Err(error) = &answer {
+            stream.fail(error);
+        }
+        answer
+    }
+
+    /// Ends the program, which answered with this `problem`.
+    pub fn refused(&self, problem: &str) -> Refusal {
+        let mut stream = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+        let error = stream.refused(&stream.window(), problem);
+        stream.fail(&error);
+        error
+    }
+}
 
 impl Trained for External {
     fn start(&self) -> Box<dyn Algorithm + '_> {
@@ -99,6 +152,7 @@ struct Stream {
     /// The command as the user wrote it.
     command: String,
     limit: Duration,
+    first: Duration,
     valid: Valid,
     process: Process,
     pipes: Pipes,
@@ -112,9 +166,10 @@ struct Stream {
 impl Stream {
     /// Starts `command` and sends it `header`.
     fn start(
-        ExternalCommand { command, limit, .. }: &ExternalCommand,
+        ExternalCommand { command, limit, first, .. }: &ExternalCommand,
         valid: Valid,
         header: &serde_json::Value,
+        values: usize,
     ) -> Result<Self, Refusal> {
         let mut shell = Command::new("sh");
         shell.arg("-c").arg(command).stdin(Stdio::piped()).stdout(Stdio::piped());
@@ -123,11 +178,12 @@ impl Stream {
         let (Some(input), Some(output)) = (child.stdin.take(), child.stdout.take()) else {
             return Err(broken(command, std::io::ErrorKind::BrokenPipe.into()));
         };
-        let pipes = Pipes::new(input, output, valid.taxels);
+        let pipes = Pipes::new(input, output, values);
         pipes.send(header.to_string());
         Ok(Self {
             command: command.clone(),
             limit: *limit,
+            first: *first,
             valid,
             process,
             pipes,
@@ -156,12 +212,6 @@ impl Stream {
     }
 
     fn ask(&mut self, window: &Window<'_>) -> Result<Answer, Refusal> {
-        let deadline = Instant::now() + self.limit;
-        // what waits here was written before the question
-        match self.pipes.waiting() {
-            None | Some(Event::InputClosed) => {}
-            Some(event) => return Err(self.unexpected(&event, deadline)),
-        }
         let mut numbers = Vec::new();
         let rows = window.with_rows(&mut numbers).phi;
         let rows = rows.values().chunks_exact(rows.ncols());
@@ -170,15 +220,30 @@ impl Stream {
         } else {
             json!(rows.collect::<Vec<_>>())
         };
-        let question = json!({"m": window.y.len(), "phi": phi, "y": window.y, "volts": window.volts});
+        let line = self.exchange(&json!({"m": window.y.len(), "phi": phi, "y": window.y, "volts": window.volts}))?;
+        self.valid.line(&line).map_err(|problem| self.refused(&self.window(), &problem))
+    }
+
+    /// Sends `question`, and gives the line that answers it.
+    fn exchange(&mut self, question: &serde_json::Value) -> Result<Vec<u8>, Refusal> {
+        let deadline = Instant::now() + self.now();
+        // what waits here was written before the question
+        match self.pipes.waiting() {
+            None | Some(Event::InputClosed) => {}
+            Some(event) => return Err(self.unexpected(&event, deadline)),
+        }
         self.asked += 1;
         self.pipes.ask(question.to_string());
-        let line = match self.pipes.next_by(deadline) {
-            Ok(Event::Line(line)) => line,
-            Ok(event) => return Err(self.unexpected(&event, deadline)),
-            Err(_) => return Err(self.late()),
-        };
-        self.valid.line(&line).map_err(|problem| self.refused(&self.window(), &problem))
+        match self.pipes.next_by(deadline) {
+            Ok(Event::Line(line)) => Ok(line),
+            Ok(event) => Err(self.unexpected(&event, deadline)),
+            Err(_) => Err(self.late()),
+        }
+    }
+
+    /// The limit of what is asked now.
+    fn now(&self) -> Duration {
+        if self.asked == 0 { self.first } else { self.limit }
     }
 
     /// The window that was asked last, in words.
@@ -189,9 +254,9 @@ impl Stream {
     /// The error of what was waited for.
     fn too_late(&self, waited: String) -> Refusal {
         Refusal::new(format!(
-            "`{}` was ended: {waited} took longer than the limit of {} s; `--external-timeout` sets another limit",
+            "`{}` was ended: {waited} took longer than the limit of {} s",
             self.command,
-            self.limit.as_secs_f64()
+            if self.asked > 1 { self.limit } else { self.first }.as_secs_f64()
         ))
     }
 

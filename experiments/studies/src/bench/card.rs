@@ -15,6 +15,14 @@ pub struct Interval {
     pub high: f64,
 }
 
+/// The interval of `drawn` about `mean`.
+pub(super) fn spread(mean: f64, mut drawn: Vec<f64>) -> Interval {
+    drawn.sort_unstable_by(f64::total_cmp);
+    let last = drawn.len().saturating_sub(1);
+    let at = |k: usize| drawn.get(k).copied().unwrap_or(mean);
+    Interval { mean, low: at(last / 40), high: at(last - last / 40) }
+}
+
 /// One task with answers of so many measurements.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Entry {

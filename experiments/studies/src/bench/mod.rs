@@ -16,13 +16,16 @@
 mod adaptive;
 mod card;
 mod events;
+mod program;
+mod ranking;
 mod rows;
 mod run;
 mod tasks;
 mod wire;
 
 pub use card::{Card, Entry, Interval, TaskCard};
-pub use run::Bench;
+pub use ranking::{Ranked, Ranking};
+pub use run::{Bench, Development};
 pub use tasks::{Fault, SUITE, SkinTrials, Split, Subject, TASKS, Task, Trial, task_named};
 pub use wire::{SkinWire, WireFrame, WireSession};
 
@@ -31,9 +34,9 @@ use adaptive::{Adaptive, BinarySearch};
 use events::Events;
 use rows::{CodeDivision, FrequencyDivision, Raster, RowsAndDecoder};
 use serde::{Deserialize, Serialize};
-use spts_circuit::{Seeding, WeightMode, Weights};
+use spts_circuit::{Seeding, WeightMode, Weights, WireConfig, Wires};
 use spts_eval::Labels;
-use spts_eval::algorithm::{Class, Contender as _};
+use spts_eval::algorithm::Class;
 use spts_eval::decoders::{AUTO, DECODERS, DecoderSpec, Needs, TrainedDecoder, auto, find};
 use spts_eval::external::ExternalCommand;
 use spts_eval::training::TrainingData;
@@ -43,6 +46,7 @@ use spts_recon::Matrix;
 use spts_recon::recover::ImagePrior;
 use spts_recon::rows::{DESIGNERS, Designer, Expected, RowNeeds, RowTask, Tolerances, designer};
 use std::path::Path;
+use std::sync::Arc;
 use std::time::Duration;
 
 /// A way to read and decode a skin, built for one task.
@@ -50,6 +54,11 @@ pub trait Entrant: Send + Sync {
     /// Largest magnitude of Σ wₖ·gₖ, S, over all its measurements of a skin with the conductances `conductance_s`, idle
     /// taxels included. The feedback resistance is chosen for it.
     fn largest_sum_s(&self, conductance_s: &[f64]) -> f64;
+
+    /// Whether its sums are to be found out on touches to learn from, since they are not known before.
+    fn learns_its_sums(&self) -> bool {
+        false
+    }
 
     /// Begins with a skin. Touches are read in order.
     fn start(&self) -> Box<dyn Reader + '_>;
@@ -121,6 +130,13 @@ impl Track {
 }
 
 /// A readout in the table [`READOUTS`].
+///
+/// ```
+/// use spts_studies::bench::READOUTS;
+///
+/// let events = READOUTS.iter().find(|line| line.name == "events").expect("in the table");
+/// assert!(events.cell.contains("a converter for its own taxel"));
+/// ```
 #[derive(Debug, Clone, Copy)]
 pub struct ReadoutLine {
     /// Name on the command line and in files.
@@ -190,6 +206,9 @@ pub struct Choice {
     kind: Kind,
     /// The program as the user wrote it.
     command: Option<String>,
+    /// The file of the program that speaks for a Python class.
+    #[expect(dead_code, reason = "it is there as long as this is")]
+    script: Option<Arc<tempfile::NamedTempFile>>,
 }
 
 #[derive(Clone)]
@@ -203,8 +222,12 @@ enum Kind {
 
 /// Program in Python that speaks for a class.
 const ADAPTER: &str = include_str!("../../assets/entrant.py");
+/// Largest file of a class, bytes.
+const MOST_BYTES: u64 = 10_000_000;
 /// Time for one answer of a program.
-const DEADLINE: Duration = Duration::from_secs(1);
+const DEADLINE: Duration = Duration::from_secs(10);
+/// Time to learn, with the first answer.
+const LEARNING: Duration = Duration::from_secs(600);
 
 impl Choice {
     /// The entrant called `name` on `track`, or on the first track that has it: a decoder of the board, a designer of
@@ -219,22 +242,40 @@ impl Choice {
             let names: Vec<String> = Track::ALL.into_iter().filter(|of| on(*of)).flat_map(Self::names).collect();
             Refusal::new(format!("no entrant is called {name:?}; valid: {}", names.join(", ")))
         })?;
-        Ok(Self { name: name.to_owned(), track, kind, command: None })
+        Ok(Self { name: name.to_owned(), track, kind, command: None, script: None })
     }
 
-    /// A program that decodes, as `--external` of `spts score` takes it.
-    pub fn program(text: &str) -> Self {
-        let command = ExternalCommand { limit: DEADLINE, ..ExternalCommand::parse(text) };
+    /// A program on `track`. As a decoder, it is one that `--external` of `spts score` takes.
+    pub fn program(text: &str, track: Option<Track>) -> Self {
+        let command = ExternalCommand { limit: DEADLINE, first: LEARNING, ..ExternalCommand::parse(text) };
         let (name, said) = (command.name.clone(), Some(text.to_owned()));
-        Self { name, track: Track::Decoder, kind: Kind::Program(command), command: said }
+        let (track, script) = (track.unwrap_or(Track::Decoder), None);
+        Self { name, track, kind: Kind::Program(command), command: said, script }
     }
 
-    /// The class in a Python file with methods `fit(train)` and `predict(phi, y)`.
-    pub fn python(file: &Path) -> Self {
+    /// The class in a Python file, which is on the track of the methods that it has: `predict`, `rows` too, or `read`.
+    ///
+    /// # Errors
+    /// [`Refusal`] if the file cannot be read, or there is no place for the program that speaks for it.
+    pub fn python(file: &Path, track: Option<Track>) -> Result<Self, Refusal> {
+        let text = spts_input::read_text(file, MOST_BYTES)?;
+        let has = |method: &str| text.contains(&format!("def {method}("));
+        let own = if has("read") {
+            Track::Readout
+        } else if has("rows") {
+            Track::Rows
+        } else {
+            Track::Decoder
+        };
+        let script = tempfile::Builder::new().prefix("spts-").suffix(".py").tempfile();
+        let script = script.and_then(|script| std::fs::write(script.path(), ADAPTER).map(|()| script));
+        let script = script.map_err(Refusal::from_error)?;
+        let quoted = |path: &Path| format!("'{}'", path.to_string_lossy().replace('\'', "'\\''"));
+        let command = format!("python3 {} {}", quoted(script.path()), quoted(file));
         let name = file.file_stem().map_or_else(|| "python".into(), |stem| stem.to_string_lossy().into_owned());
-        let quoted = |text: &str| format!("'{}'", text.replace('\'', "'\\''"));
-        let command = format!("python3 -c {} {}", quoted(ADAPTER), quoted(&file.to_string_lossy()));
-        Self { name, command: Some(file.to_string_lossy().into_owned()), ..Self::program(&command) }
+        let said = Some(file.to_string_lossy().into_owned());
+        let program = Self::program(&command, track.or(Some(own)));
+        Ok(Self { name, command: said, script: Some(Arc::new(script)), ..program })
     }
 
     /// Whether it is a program.
@@ -249,9 +290,9 @@ impl Choice {
 
     /// SHA-256 of the last word of a program's command that is a file.
     pub(crate) fn sha256(&self) -> Option<String> {
-        let words = self.command()?.split_whitespace();
-        let files = words.filter_map(|word| std::fs::read(word.trim_matches('\'')).ok());
-        files.last().map(|bytes| tasks::in_digits(&bytes))
+        let words = self.command()?.split_whitespace().map(|word| Path::new(word.trim_matches('\'')));
+        let file = words.rev().find(|path| path.is_file())?;
+        std::fs::read(file).ok().map(|bytes| tasks::in_digits(&bytes))
     }
 
     fn on(track: Track, name: &str) -> Option<Kind> {
@@ -266,7 +307,9 @@ impl Choice {
     /// Names on `track`.
     pub fn names(track: Track) -> Vec<String> {
         match track {
-            Track::Decoder => [AUTO].into_iter().chain(DECODERS.iter().map(|spec| spec.name)).map(str::to_owned).collect(),
+            Track::Decoder => {
+                [AUTO].into_iter().chain(DECODERS.iter().map(|spec| spec.name)).map(str::to_owned).collect()
+            }
             Track::Rows => {
                 let there = DESIGNERS.iter().filter(|line| line.needs != RowNeeds::Classes);
                 there.map(|line| line.name.to_owned()).collect()
@@ -281,16 +324,13 @@ impl Choice {
     /// [`Refusal`] if it cannot do the task.
     pub(crate) fn build(&self, prepared: &Prepared) -> Result<Box<dyn Entrant>, Refusal> {
         let shape = [prepared.layout.rows(), prepared.layout.cols()];
-        let random = |trained| Ok(Box::new(RowsAndDecoder::new(prepared.random_rows()?, trained)?) as Box<dyn Entrant>);
+        let decoded = |trained| RowsAndDecoder::given(&prepared.weights()?, &prepared.measurements, trained);
+        let random = |trained| Ok(Box::new(decoded(trained)?) as Box<dyn Entrant>);
         match &self.kind {
             Kind::Readout(line) => Ok((line.build)(&prepared.layout, prepared.streams)),
             Kind::Auto => random(prepared.trained(auto(shape, false))?),
             Kind::Decoder(spec) => random(prepared.trained(spec)?),
-            Kind::Program(command) => {
-                let data = prepared.images()?;
-                let trained = command.learn(&data, &prepared.labels, None)?;
-                Ok(Box::new(RowsAndDecoder::new(prepared.random_rows()?, TrainedDecoder::of(trained, &data))?.in_turn()))
-            }
+            Kind::Program(command) => program::start(command, self.track, prepared),
             Kind::Rows(designer) => {
                 let expected = prepared.expected()?;
                 let rows = prepared.measurements.iter().map(|m| {
@@ -314,6 +354,8 @@ const WHOLE_IMAGES: usize = 400;
 pub(crate) struct Prepared {
     /// Rows, columns and pitch.
     pub(crate) layout: SkinLayout,
+    /// Wires of the skin.
+    pub(crate) wires: usize,
     /// Numbers of measurements for an answer.
     pub(crate) measurements: Vec<usize>,
     /// Touches to learn from, of other skins than those that are scored.
@@ -357,16 +399,12 @@ impl Prepared {
         Expected::like(&prior, shape, Tolerances::default())
     }
 
-    /// The published cells' own rows: pseudorandom ±1 from mixed seeds, the first M of them.
-    fn random_rows(&self) -> Result<Vec<Matrix>, Refusal> {
-        let taxels = self.layout.taxels();
-        let weights = Weights::new(WeightMode::Binary, Seeding::Mixed, u32::try_from(taxels).unwrap_or(u32::MAX));
-        let rows = self.measurements.iter().map(|&m| {
-            let mut signs = vec![0.0; m * taxels];
-            weights.fill_rows(0, &mut signs);
-            Matrix::from_rows(m, taxels, signs)
-        });
-        rows.collect()
+    /// The published cells' own rows: pseudorandom ±1 from mixed seeds, on as many wires as the skin has.
+    fn weights(&self) -> Result<Weights, Refusal> {
+        let taxels = u32::try_from(self.layout.taxels()).unwrap_or(u32::MAX);
+        let bands = WireConfig { bands: Some(self.wires), ..WireConfig::default() };
+        let wires = if self.wires > 1 { Wires::new(&[bands], &self.layout)? } else { None };
+        Weights::new(WeightMode::Binary, Seeding::Mixed, taxels).wired(wires)
     }
 }
 
@@ -375,7 +413,6 @@ mod tests {
     use super::*;
     use crate::touches::TouchScore;
     use spts_models::ConductanceMap;
-    use std::sync::Arc;
 
     /// IoU with many measurements of a contact that stands out, at least: two thirds of the taxels are right.
     const LEAST_IOU: f64 = 0.6;
@@ -398,7 +435,7 @@ mod tests {
         let layout = SkinLayout::with_pitch(rows, cols, 15e-3).expect("a skin");
         let entrant = (line.build)(&layout, Streams::new(7));
         let (touch, nothing) = (plate(&layout, 150e-6), plate(&layout, 0.0));
-        let wire = SkinWire::new(layout, touch.conductance_s.values()).expect(name);
+        let wire = SkinWire::new(layout, 1, touch.conductance_s.values()).expect(name);
         let idle_s = wire.electronics.skin.idle_s;
         let whole: Vec<f64> = touch.conductance_s.values().iter().map(|g| g + idle_s).collect();
         let largest_sum_s = entrant.largest_sum_s(&whole);
@@ -445,7 +482,7 @@ mod tests {
         let layout = SkinLayout::with_pitch(4, 4, 15e-3).unwrap();
         let mut values = vec![0.0; 16];
         (values[3], values[7], values[11]) = (100e-6, 100e-6, 100e-6);
-        let wire = SkinWire::new(layout, &values).unwrap();
+        let wire = SkinWire::new(layout, 1, &values).unwrap();
         let rows = spts_circuit::Patterns::of_levels(
             2,
             &[(); 32].iter().enumerate().map(|(k, ())| if k < 16 { 1.0 } else { -1.0 }).collect::<Vec<f64>>(),

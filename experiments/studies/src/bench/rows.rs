@@ -3,7 +3,7 @@
 
 use super::wire::{NEUTRAL, WireSession};
 use super::{Entrant, Reader, Reading};
-use spts_circuit::{CellCodes, Patterns};
+use spts_circuit::{CellCodes, Patterns, WeightRows, Weights};
 use spts_eval::decoders::TrainedDecoder;
 use spts_eval::{Press, PressRows, Scorer};
 use spts_input::Refusal;
@@ -209,10 +209,21 @@ fn largest(sums: &[f64]) -> f64 {
 
 /// Rows of ±1 for every number of measurements, and a decoder.
 pub(super) struct RowsAndDecoder {
-    /// Rows as numbers, as the decoder gets them, and as codes of the cells.
-    rows: BTreeMap<usize, (Matrix, Arc<PressRows>, Patterns)>,
+    rows: BTreeMap<usize, Rows>,
     decoder: TrainedDecoder,
     in_turn: bool,
+}
+
+/// Rows as numbers, as a decoder gets them, and as the cells put them out.
+struct Rows {
+    levels: Matrix,
+    shared: Arc<PressRows>,
+    cells: Cells,
+}
+
+enum Cells {
+    Given(Weights),
+    Own(Patterns),
 }
 
 impl RowsAndDecoder {
@@ -221,13 +232,26 @@ impl RowsAndDecoder {
     /// # Errors
     /// [`Refusal`] for rows that are not ±1.
     pub(super) fn new(rows: Vec<Matrix>, decoder: TrainedDecoder) -> Result<Self, Refusal> {
-        let each = rows.into_iter().map(|rows| {
-            let values = rows.view().values();
-            if let Some(level) = values.iter().find(|level| level.abs() != 1.0) {
+        let each = rows.into_iter().map(|levels| {
+            let values = levels.view().values();
+            if let Some(level) = values.iter().find(|level| ![-1.0, 1.0].contains(*level)) {
                 return Err(Refusal::range("rows", level, "{-1, 1}"));
             }
-            let codes = Patterns::of_levels(rows.nrows(), values)?;
-            Ok((rows.nrows(), (rows.clone(), Arc::new(PressRows::of_matrix(&rows)), codes)))
+            let cells = Cells::Own(Patterns::of_levels(levels.nrows(), values)?);
+            Ok((levels.nrows(), Rows { shared: Arc::new(PressRows::of_matrix(&levels)), levels, cells }))
+        });
+        Ok(Self { rows: each.collect::<Result<_, Refusal>>()?, decoder, in_turn: false })
+    }
+
+    /// With the first rows of `weights`, which may have several wires, for each of `measurements`.
+    ///
+    /// # Errors
+    /// None for weights of ±1.
+    pub(super) fn given(weights: &Weights, measurements: &[usize], decoder: TrainedDecoder) -> Result<Self, Refusal> {
+        let each = measurements.iter().map(|&m| {
+            let rows = WeightRows::new(weights, 0, m);
+            let levels = Matrix::from_rows(m, weights.taxels(), rows.to_vec())?;
+            Ok((m, Rows { levels, shared: Arc::new(PressRows::new(rows)), cells: Cells::Given(weights.clone()) }))
         });
         Ok(Self { rows: each.collect::<Result<_, Refusal>>()?, decoder, in_turn: false })
     }
@@ -245,7 +269,7 @@ impl Entrant for RowsAndDecoder {
             rows.apply(conductance_s, &mut sums);
             largest(&sums)
         };
-        self.rows.values().map(|(rows, ..)| of(rows)).fold(0.0, f64::max)
+        self.rows.values().map(|rows| of(&rows.levels)).fold(0.0, f64::max)
     }
 
     fn start(&self) -> Box<dyn Reader + '_> {
@@ -269,8 +293,12 @@ struct Decoding<'a> {
 impl Reader for Decoding<'_> {
     fn read(&mut self, wire: &mut WireSession<'_>) -> Result<Reading, Refusal> {
         let count = wire.left();
-        let (_, rows, codes) = self.entrant.rows.get(&count).ok_or_else(|| Refusal::new(format!("{count} rows")))?;
-        let press = Press::on(Arc::clone(rows), wire.signs(count, codes, count)?.volts, 0.0);
+        let rows = self.entrant.rows.get(&count).ok_or_else(|| Refusal::new(format!("{count} rows")))?;
+        let frame = match &rows.cells {
+            Cells::Given(weights) => wire.given(count, weights, count)?,
+            Cells::Own(patterns) => wire.signs(count, patterns, count)?,
+        };
+        let press = Press::on(Arc::clone(&rows.shared), frame.volts, 0.0);
         let window = press.window(0, count).ok_or_else(|| Refusal::new("a sample was lost"))?;
         let began = std::time::Instant::now();
         let answer = self.scorer.answers(std::slice::from_ref(&window))?.into_iter().next().unwrap_or_default();

@@ -1,21 +1,24 @@
 //! Runs an entrant on the tasks, and scores its answers.
 
-use super::card::{Card, Entry, Interval, TaskCard};
+use super::card::{Card, Entry, Interval, TaskCard, spread};
 use super::rows::CodeDivision;
-use super::tasks::{SUITE, SkinTrials, Split, Subject, TASKS, Task, Trial, digest};
+use super::tasks::{SUITE, SkinTrials, Split, Subject, Task, Trial, digest};
 use super::wire::SkinWire;
-use super::{Choice, Entrant, Prepared, Reader, Reading, Track};
+use super::{Choice, Entrant, Prepared, Reader, Reading, Track, UNIT_S};
 use crate::touches::{Touch, TouchScore};
 use rand::RngExt as _;
 use rayon::prelude::*;
 use spts::progress::Progress;
 use spts::provenance::{Machine, Provenance};
+use spts_circuit::WeightRows;
 use spts_eval::Labels;
 use spts_eval::algorithm::Class;
 use spts_input::Refusal;
 use spts_models::{SkinLayout, Streams};
+use spts_recon::Matrix;
 use spts_recon::localise::centre_of_mass;
 use spts_recon::metrics::{SUPPORT_THRESHOLD, median};
+use spts_recon::operator::LinearOperator as _;
 use spts_recon::statistics::mean;
 
 /// A run of the benchmark.
@@ -29,6 +32,57 @@ pub struct Bench {
     pub split: Split,
     /// Whether few touches are scored.
     pub quick: bool,
+}
+
+/// Touches of the public split with their samples, for the development of decoders.
+pub struct Development {
+    /// Rows of ±1 (0 of another wire's taxels), M × taxels: M the most measurements of the task. Fewer are the first of
+    /// them.
+    pub phi: Matrix,
+    /// Samples, µS, touches × M.
+    pub y: Matrix,
+    /// True conductances, µS, touches × taxels.
+    pub images: Matrix,
+    /// Name of the object or family of every touch.
+    pub names: Vec<String>,
+}
+
+impl Development {
+    /// What is there of `task`. A touch that moves is there at each of its moments.
+    ///
+    /// # Errors
+    /// [`Refusal`] if a touch cannot be pressed.
+    pub fn of(task: &Task) -> Result<Self, Refusal> {
+        let layout = task.layout()?;
+        let most = task.measurements.iter().copied().max().unwrap_or(1);
+        let training = task.training()?;
+        let wire = SkinWire::of(task, &training)?;
+        let (labels, streams, measurements) = (Labels::default(), Streams::new(1), vec![most]);
+        let prepared = Prepared { layout, wires: task.wires, measurements, training, labels, streams };
+        let weights = prepared.weights()?;
+        let phi = Matrix::from_rows(most, layout.taxels(), WeightRows::new(&weights, 0, most).to_vec())?;
+        let mut sums = vec![0.0; most];
+        let of = |touch: &Touch| {
+            phi.apply(touch.conductance_s.values(), &mut sums);
+            sums.iter().fold(0.0_f64, |largest, sum| largest.max(sum.abs()))
+        };
+        let largest_sum_s = prepared.training.iter().map(of).fold(0.0, f64::max);
+        let (mut y, mut images, mut names) = (Vec::new(), Vec::new(), Vec::new());
+        for skin in task.skins(Split::Public, false)? {
+            let mut session = wire.session(largest_sum_s, skin.device, skin.faults.clone())?;
+            for (trial, number) in skin.trials.iter().zip(0..) {
+                for (time_s, truth) in &trial.moments {
+                    let start_s = time_s - most as f64 * wire.period_s / wire.wires as f64;
+                    y.extend(session.hold(trial, number, start_s, most)?.given(most, &weights, most)?.volts);
+                    images.extend(truth.conductance_s.values().iter().map(|g| g / UNIT_S));
+                    names.push(trial.name.to_string());
+                }
+            }
+        }
+        let touches = names.len();
+        let (y, images) = (Matrix::from_rows(touches, most, y)?, Matrix::from_rows(touches, layout.taxels(), images)?);
+        Ok(Self { phi, y, images, names })
+    }
 }
 
 /// A place is right within this distance, taxels.
@@ -46,7 +100,7 @@ struct Scored {
 impl Bench {
     /// All tasks, the test split.
     pub fn new(choice: Choice) -> Self {
-        Self { choice, tasks: TASKS.iter().collect(), split: Split::Test, quick: false }
+        Self { tasks: Task::of(choice.track), choice, split: Split::Test, quick: false }
     }
 
     /// Scores the entrant. All values but the times are the same for any number of threads.
@@ -62,7 +116,7 @@ impl Bench {
         }
         progress.end();
         let known = self.tasks.iter().zip(&scored).all(|(task, scored)| task.knows(&scored.card.data_sha256));
-        let all = TASKS.iter().all(|task| self.tasks.contains(&task));
+        let all = Task::of(self.choice.track).iter().all(|task| self.tasks.contains(task));
         let machine = Machine::here();
         let Provenance { version, git_revision, .. } = Provenance::new(0, String::new());
         let split = match self.split {
@@ -97,14 +151,12 @@ impl Bench {
         }
         let labels = Labels::of(training.iter().map(|touch| &*touch.name));
         let templates = Templates::new(&training, &layout);
-        let sum = |touch: &Touch| touch.conductance_s.sum();
-        let largest = training.iter().max_by(|a, b| sum(a).total_cmp(&sum(b)));
-        let wire = SkinWire::new(layout, largest.map_or(&[][..], |touch| touch.conductance_s.values()))?;
+        let wire = SkinWire::of(task, &training)?;
         let judge = Judge { task, layout, labels: &labels, templates: &templates };
         let floor = judge.floor(&training, &skins);
         let ceiling = judge.ceiling(&wire, &training, &skins)?;
         let streams = Streams::new(1).child("bench/entrant", 0);
-        let prepared = Prepared { layout, measurements, training, labels: labels.clone(), streams };
+        let prepared = Prepared { layout, wires: task.wires, measurements, training, labels: labels.clone(), streams };
         let mut card = TaskCard {
             task: task.name.to_owned(),
             subject: task.subject,
@@ -159,8 +211,12 @@ impl Judge<'_> {
             let whole: Vec<f64> = touch.conductance_s.values().iter().map(|g| g + idle_s).collect();
             entrant.largest_sum_s(&whole)
         });
-        let largest_sum_s = sums.fold(0.0, f64::max);
-        let one = |skin: &SkinTrials| self.skin(&mut *entrant.start(), wire, largest_sum_s, skin, &prepared.measurements);
+        let mut largest_sum_s = sums.fold(0.0, f64::max);
+        if entrant.learns_its_sums() {
+            largest_sum_s = learned_sum_s(entrant, wire, prepared)?;
+        }
+        let one =
+            |skin: &SkinTrials| self.skin(&mut *entrant.start(), wire, largest_sum_s, skin, &prepared.measurements);
         if entrant.in_turn() {
             return skins.iter().map(one).collect();
         }
@@ -182,7 +238,7 @@ impl Judge<'_> {
             for &m in measurements {
                 let mut sum = 0.0;
                 for (time_s, truth) in &trial.moments {
-                    let start_s = time_s - m as f64 * wire.period_s;
+                    let start_s = time_s - m as f64 * wire.period_s / wire.wires as f64;
                     let reading = reader.read(session.hold(trial, number, start_s, m)?)?;
                     times_s.push(reading.time_s);
                     sum += self.score(&reading, truth);
@@ -221,9 +277,8 @@ impl Judge<'_> {
         }
         let reading = Reading::of(image);
         let trials = skins.iter().flat_map(|skin| &skin.trials);
-        let each = trials.map(|trial| {
-            mean(trial.moments.iter().map(|(_, truth)| self.score(&reading, truth))).unwrap_or(0.0)
-        });
+        let each =
+            trials.map(|trial| mean(trial.moments.iter().map(|(_, truth)| self.score(&reading, truth))).unwrap_or(0.0));
         mean(each).unwrap_or(0.0)
     }
 
@@ -239,11 +294,11 @@ impl Judge<'_> {
         });
         let largest_sum_s = sums.fold(0.0, f64::max);
         let each = skins.par_iter().map(|skin| {
-            let held = |trial: &Trial| {
-                trial.moments.iter().map(|(_, truth)| Trial::held(truth.clone())).collect::<Vec<_>>()
-            };
+            let held =
+                |trial: &Trial| trial.moments.iter().map(|(_, truth)| Trial::held(truth.clone())).collect::<Vec<_>>();
             // the cells work, and the skin is as it was read
-            let (faults, trials) = ([].into(), skin.trials.iter().flat_map(held).collect());
+            let count = if taxels > LARGE { 1 } else { skin.trials.len() };
+            let (faults, trials) = ([].into(), skin.trials.iter().take(count).flat_map(held).collect());
             let skin = SkinTrials { device: skin.device, faults, trials };
             let (values, _) =
                 self.skin(&mut *entrant.start(), wire, largest_sum_s, &skin, &[taxels.next_power_of_two()])?;
@@ -251,6 +306,26 @@ impl Judge<'_> {
         });
         Ok(mean(each.collect::<Result<Vec<_>, Refusal>>()?.concat()).unwrap_or(0.0))
     }
+}
+
+/// Of skins of more taxels the ceiling is that of one touch a skin.
+const LARGE: usize = 2048;
+
+/// Touches on which the sums of an entrant are found out.
+const TRIED: usize = 16;
+
+/// Largest sum that the entrant asks for, S, on touches to learn from: with a feedback for all taxels at once.
+fn learned_sum_s(entrant: &dyn Entrant, wire: &SkinWire, prepared: &Prepared) -> Result<f64, Refusal> {
+    let all = |touch: &Touch| touch.conductance_s.sum();
+    let largest = prepared.training.iter().map(all).fold(0.0, f64::max);
+    let mut session = wire.session(largest, prepared.streams, [].into())?;
+    let mut reader = entrant.start();
+    for (touch, number) in prepared.training.iter().take(TRIED).zip(0..) {
+        for &m in &prepared.measurements {
+            reader.read(session.hold(&Trial::held(touch.clone()), number, 0.0, m)?)?;
+        }
+    }
+    Ok(session.largest_sum_s())
 }
 
 /// Mean of the values of `entry` over all touches.
@@ -271,7 +346,7 @@ fn points(card: &TaskCard, values: &[Vec<&Vec<f64>>]) -> f64 {
 }
 
 /// Draws skins, and of each its touches, with replacement.
-fn resampled<'a>(values: &'a [Vec<Vec<f64>>], streams: Streams, draw: u64) -> Vec<Vec<&'a Vec<f64>>> {
+fn resampled(values: &[Vec<Vec<f64>>], streams: Streams, draw: u64) -> Vec<Vec<&Vec<f64>>> {
     let mut rng = streams.rng("bench/bootstrap", draw);
     let skins = (0..values.len()).map(|_| {
         let skin = &values[rng.random_range(0..values.len())];
@@ -286,18 +361,13 @@ fn interval(values: &[Vec<Vec<f64>>], of: impl Fn(&[Vec<&Vec<f64>>]) -> f64) -> 
     spread(of(&whole), drawn.collect())
 }
 
-fn spread(mean: f64, mut drawn: Vec<f64>) -> Interval {
-    drawn.sort_unstable_by(f64::total_cmp);
-    let last = drawn.len().saturating_sub(1);
-    let at = |k: usize| drawn.get(k).copied().unwrap_or(mean);
-    Interval { mean, low: at(last / 40), high: at(last - last / 40) }
-}
-
 /// Mean points over the tasks; skins and touches of all of them are drawn anew.
 fn total(tasks: &[Scored]) -> Interval {
     let all = |of: &dyn Fn(&Scored) -> f64| mean(tasks.iter().map(of)).unwrap_or(0.0);
     let drawn = (0..RESAMPLES as u64).map(|draw| {
-        all(&|task: &Scored| points(&task.card, &resampled(&task.values, Streams::new(1).child(&task.card.task, 0), draw)))
+        all(&|task: &Scored| {
+            points(&task.card, &resampled(&task.values, Streams::new(1).child(&task.card.task, 0), draw))
+        })
     });
     spread(all(&|task| task.card.points.mean), drawn.collect())
 }

@@ -1,6 +1,7 @@
-//! The tasks of the suite `touch-1`: what is pressed, on which skins, how many measurements an answer may take, and what
-//! is scored of it.
+//! The tasks of the suite `touch-1`: what is pressed, on which skins, how many measurements an answer may take, and
+//! what is scored of it.
 
+use super::Track;
 use crate::touches::{Touch, TouchObjects, TouchScene};
 use rand::RngExt as _;
 use rand_distr::{Distribution as _, StandardNormal};
@@ -33,13 +34,7 @@ pub enum Subject {
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Scene {
     /// Objects that are held.
-    Held {
-        objects: TouchObjects,
-        placed: bool,
-        families: &'static [&'static str],
-        size_m: [f64; 2],
-        contacts: usize,
-    },
+    Held { objects: TouchObjects, placed: bool, families: &'static [&'static str], size_m: [f64; 2], contacts: usize },
     /// A shape that slides over the sheet.
     Sliding,
     /// A shape whose force grows.
@@ -67,6 +62,8 @@ pub struct Task {
     pub about: &'static str,
     /// Rows and columns of the skin.
     pub side: usize,
+    /// Wires, bands of rows, that are measured at once.
+    pub wires: usize,
     /// What is scored.
     pub subject: Subject,
     /// Numbers of measurements for one answer.
@@ -94,7 +91,8 @@ const fn objects(placed: bool) -> Scene {
 
 const fn task(name: &'static str, about: &'static str, scene: Scene) -> Task {
     let (measurements, more, touches) = (FEW, ALL, [4, 20]);
-    Task { name, about, side: 10, subject: Subject::Image, measurements, more, scene, trouble: Trouble::Nothing, touches }
+    let (side, wires, subject, trouble) = (10, 1, Subject::Image, Trouble::Nothing);
+    Task { name, about, side, wires, subject, measurements, more, scene, trouble, touches }
 }
 
 const fn large(name: &'static str, about: &'static str, contacts: usize) -> Task {
@@ -118,7 +116,10 @@ pub const TASKS: &[Task] = &[
         ..task("class_anywhere", "which of seventeen objects, anywhere and turned", objects(false))
     },
     Task { touches: [2, 8], ..task("sliding", "a shape that slides at 50 to 400 mm/s, in time", Scene::Sliding) },
-    Task { touches: [2, 8], ..task("growing", "a shape pressed from 0.5 to 40 N within 0.1 s, in time", Scene::Growing) },
+    Task {
+        touches: [2, 8],
+        ..task("growing", "a shape pressed from 0.5 to 40 N within 0.1 s, in time", Scene::Growing)
+    },
     Task {
         subject: Subject::Place,
         touches: [2, 6],
@@ -126,7 +127,11 @@ pub const TASKS: &[Task] = &[
     },
     Task {
         trouble: Trouble::Drift,
-        ..task("drift", "shapes, up to eight hours and 10 K after the untouched skin was read", shapes(&[], [0.02, 0.09], 1))
+        ..task(
+            "drift",
+            "shapes, up to eight hours and 10 K after the untouched skin was read",
+            shapes(&[], [0.02, 0.09], 1),
+        )
     },
     Task {
         trouble: Trouble::Faults,
@@ -135,6 +140,7 @@ pub const TASKS: &[Task] = &[
     large("contacts_1", "one shape on 1,024 taxels", 1),
     large("contacts_3", "three shapes at once on 1,024 taxels", 3),
     large("contacts_10", "ten shapes at once on 1,024 taxels", 10),
+    Task { wires: 4, ..large("wires_4", "three shapes at once on 1,024 taxels with four wires", 3) },
     Task {
         side: 100,
         measurements: &[100, 200, 500],
@@ -145,7 +151,113 @@ pub const TASKS: &[Task] = &[
 ];
 
 /// SHA-256 of the touches of the test split: task, with `--quick`, and without.
-const DIGESTS: &[(&str, [&str; 2])] = &[];
+const DIGESTS: &[(&str, [&str; 2])] = &[
+    (
+        "small",
+        [
+            "9bd914376077726f8663797cfd0b2d029c6ebe0b0ba2fc5b96deb56e25fed70a",
+            "fa57e09aa07038f222415dd708ddfd8d52c674f4dd3918dbf448708ff9ccbc76",
+        ],
+    ),
+    (
+        "thin",
+        [
+            "890dc32148d54a5609a58269155df123f67ab4ac87eee0c6273b38f01a20ec33",
+            "25ba1917db7400b2a313caef34cac256f38f2a357fb263b1174046b9186b8971",
+        ],
+    ),
+    (
+        "broad",
+        [
+            "f387e5d0d65f64820515181d3d5acb26da50ff44afdcd7d3c1eb9c8fa50d583c",
+            "a26257122ad74b687dc5dc7c45eb5390b513bd1c62b7498581e1301307311cac",
+        ],
+    ),
+    (
+        "class_placed",
+        [
+            "bd4f130aee5b28fff0c73ff543764a8715080e067a94c6f641f1ac2d36cea052",
+            "1f3740f8c5702005add39a3047e401d31b90b641fa4121afd050771d67c23809",
+        ],
+    ),
+    (
+        "class_anywhere",
+        [
+            "0ce30db8deaf769199175cd8011300daeaac100497349cfd20bb994c85bf8487",
+            "c0934159ad50a48250fa4e5f4a3cf292dae093504a680e0f30ab58f800df15a1",
+        ],
+    ),
+    (
+        "sliding",
+        [
+            "8bb61e6f7741781603567337550669c67f2ecfc1122db11711759245bf90163d",
+            "e3c8d6f1904aca5e5766e0d30e6e31fc1e6614d55f2be75fe91ca633699ebe94",
+        ],
+    ),
+    (
+        "growing",
+        [
+            "143f21e66139315405c3cca267434c03258bc7086828d3ae28bf84eb9520af52",
+            "4b22b64dd66be273fb39d7a86db236c61c52abdcb14a46645dd5d97c4e94c5fb",
+        ],
+    ),
+    (
+        "ball",
+        [
+            "9d7c4c99d215b81e319fcc170d576c400dba21536c858a1f673ab0a3de7abd76",
+            "669e7cfa786d9009f20d97dddc1a470af96b945bf473069ba9be397c3722cf71",
+        ],
+    ),
+    (
+        "drift",
+        [
+            "1b16a880b363bdafa5b2725e2cce014ed76ba45948823777d3debf3e9613f4db",
+            "6223f1c1084b6bcc275ed6dda7b9952334f7bf5d5cff5dc83c0f1994445b8483",
+        ],
+    ),
+    (
+        "faults",
+        [
+            "d169ed411fff45c1855bedb374dfbbab085d066c9045029dd512a397afdafe78",
+            "8c06373522556dff3a930a404157961fc0c0df48e48aef086d81bcf3bde6160c",
+        ],
+    ),
+    (
+        "contacts_1",
+        [
+            "ab62511c68525d2ede0b7e184a327438d56d3a7e03b7e1ab336e7a8a5679f632",
+            "a656967213d568555993f79e59b24253b6f73206dd6c81820878d4961a44e748",
+        ],
+    ),
+    (
+        "contacts_3",
+        [
+            "9f86607cd477809537adbd5535bf1f4ef21178334995f85f669abbb73b1cd6f5",
+            "472426bafd745859b83545f4341d6f0c45c7698aac0696b8516e4427f5263d4f",
+        ],
+    ),
+    (
+        "contacts_10",
+        [
+            "75377a2cb82d112a1d62de9a0a91134e8b6b9077c68ab4495f576591ac43e49c",
+            "38456f8ce7107c81a2fdb653ffb46ed1f76410f1aadf98d222747b0744505388",
+        ],
+    ),
+    (
+        "wires_4",
+        [
+            "9a86e15f3ddf4682707d1b348ac528a7a62c6e65852020bec849176c4f95d765",
+            "45de88f4c6250d25cf10e4846e06b997796b84f2b59c848766cf52dee0837cc6",
+        ],
+    ),
+    (
+        "size_10000",
+        [
+            "ebeeea93bd2386cad4c01a8cf7821984edd710ebc1020aa79f950ca4c4d59d59",
+            "df49de60acf55962b586e4e5777df682afa7d9486b77219769efd13200d7f035",
+        ],
+    ),
+];
 
 /// Skins of a task, with `--quick` and without.
 const SKINS: [usize; 2] = [2, 6];
@@ -153,6 +265,15 @@ const SKINS: [usize; 2] = [2, 6];
 const TRAINING: [(usize, usize); 2] = [(1024, 204), (usize::MAX, 17)];
 
 /// The task called `name`.
+///
+/// ```
+/// use spts_studies::bench::{Split, task_named};
+///
+/// let small = task_named("small").expect("in the suite");
+/// let skins = small.skins(Split::Public, true)?;
+/// assert_eq!((skins.len(), skins[0].trials.len(), small.measurements), (2, 4, &[7, 20, 50][..]));
+/// # Ok::<(), spts_input::Refusal>(())
+/// ```
 pub fn task_named(name: &str) -> Option<&'static Task> {
     TASKS.iter().find(|task| task.name == name)
 }
@@ -246,6 +367,11 @@ pub struct SkinTrials {
 }
 
 impl Task {
+    /// Tasks of `track`: those on several wires are for rows that are given.
+    pub fn of(track: Track) -> Vec<&'static Self> {
+        TASKS.iter().filter(|task| task.wires == 1 || track == Track::Decoder).collect()
+    }
+
     /// Rows, columns and pitch.
     ///
     /// # Errors
@@ -336,7 +462,7 @@ impl Task {
         &self,
         device: Streams,
         touches: usize,
-        poses: fn(&Self, Streams) -> Vec<(f64, [f64; 4])>,
+        poses: fn(&Self, Streams) -> Vec<Pose>,
     ) -> Result<Vec<Trial>, Refusal> {
         let specimen = device.rng("specimen", 0).random();
         let each = (0..touches as u64).into_par_iter().map(|number| {
@@ -354,7 +480,7 @@ impl Task {
     }
 
     /// A straight way of 60 mm about a place within 20 mm of the middle.
-    fn slides(&self, own: Streams) -> Vec<(f64, [f64; 4])> {
+    fn slides(&self, own: Streams) -> Vec<Pose> {
         let mut rng = own.rng("way", 0);
         let [x, y] = [(); 2].map(|()| rng.random_range(-0.02..0.02));
         let (turn, along): (f64, f64) = (rng.random_range(-180.0..180.0), rng.random_range(0.0..std::f64::consts::TAU));
@@ -369,7 +495,7 @@ impl Task {
     }
 
     /// A force that grows in proportion to time at one place.
-    fn grows(&self, own: Streams) -> Vec<(f64, [f64; 4])> {
+    fn grows(&self, own: Streams) -> Vec<Pose> {
         let mut rng = own.rng("way", 0);
         let [x, y] = [(); 2].map(|()| rng.random_range(-0.04..0.04));
         let turn = rng.random_range(-180.0..180.0);
@@ -410,7 +536,7 @@ impl Task {
                 sums.push(row.conductance().sum());
             }
             let largest = sums.iter().copied().fold(0.0, f64::max);
-            let pressed = |k: usize| k % 2 == 0 && sums[k] > PRESSED * largest;
+            let pressed = |k: usize| k.is_multiple_of(2) && sums[k] > PRESSED * largest;
             trials.extend(Trial::course(course, times_s, pressed));
         }
         Ok(trials)
@@ -450,6 +576,9 @@ impl Task {
     }
 }
 
+/// A time, s, and the place, m, rotation, degrees, and force, N, of then.
+type Pose = (f64, [f64; 4]);
+
 /// Instants of a course.
 const INSTANTS: usize = 25;
 /// Windows of a drop, a millisecond apart.
@@ -477,4 +606,23 @@ pub(super) fn digest(skins: &[SkinTrials]) -> String {
 /// SHA-256 of `bytes` in hexadecimal digits.
 pub(super) fn in_digits(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The touches of a release stay what they are; those of other splits are others.
+    #[test]
+    fn the_touches_are_those_of_the_release() {
+        let (mut lines, mut known) = (String::new(), true);
+        for task in TASKS {
+            let of = |split: Split, quick: bool| digest(&task.skins(split, quick).unwrap());
+            let tests = [true, false].map(|quick| of(Split::Test, quick));
+            assert_ne!(tests[0], of(Split::Public, true), "{}", task.name);
+            known &= DIGESTS.contains(&(task.name, [&*tests[0], &*tests[1]]));
+            lines.push_str(&format!("    (\"{}\", {tests:?}),\n", task.name));
+        }
+        assert!(known, "they are now\n{lines}");
+    }
 }

@@ -1,16 +1,20 @@
 //! The common wire as an entrant sees it.
 
-use super::tasks::{Fault, Trial};
+use super::UNIT_S;
 use super::rows::OneByOne;
+use super::tasks::{Fault, Task, Trial};
 use crate::electronics::ElectronicsStudy;
-use crate::touches::TouchWire;
+use crate::touches::{Touch, TouchWire};
 use crate::wiring::{Fitted, amplifier, bisected, pressed_skin, sums};
 use rand_distr::{Distribution as _, StandardNormal};
 use spts_circuit::amplifier::{Budget, Setting};
-use spts_circuit::{CellCodes, Interpolated, Mode, Patterns, Profile, Readout, Seeding, Span};
+use spts_circuit::{
+    CellCodes, CompressiveWeights, Interpolated, Mode, Patterns, Profile, Readout, Seeding, Span, Weights, Wires,
+};
 use spts_input::Refusal;
 use spts_models::{ConductanceMap, SkinLayout, Streams};
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Frames of the idle skin that the reference is the mean of.
@@ -76,6 +80,8 @@ pub struct WireSession<'a> {
     device: Streams,
     faults: Arc<[(usize, Fault)]>,
     held: Held,
+    /// Largest sum that was asked for, S.
+    largest_sum_s: f64,
     /// Readouts with what they give without a touch, by the rows that they measure.
     frames: BTreeMap<usize, (TouchWire, Idle)>,
 }
@@ -140,23 +146,46 @@ impl<'a> WireSession<'a> {
         key: usize,
         rows: &R,
         all: usize,
-        measured: std::ops::Range<usize>,
+        measured: Range<usize>,
     ) -> Result<WireFrame, Refusal> {
+        self.built(key, all, |session| {
+            let readout = Readout::new(&session.profile, Mode::Raster, &session.skin.layout, session.device, 0)?;
+            readout.with_codes(|_| Ok(Box::new(session.cells(rows.clone()))))
+        })?;
+        self.measure(key, measured)
+    }
+
+    /// Cells that put out `rows`.
+    fn cells<R>(&self, rows: R) -> Cells<R> {
+        Cells { rows, plus: self.plus.0, faults: Arc::clone(&self.faults) }
+    }
+
+    /// Makes the readout with the key `key`, if it is new, and reads the idle skin with it.
+    fn built(
+        &mut self,
+        key: usize,
+        all: usize,
+        build: impl FnOnce(&Self) -> Result<Readout, Refusal>,
+    ) -> Result<(), Refusal> {
         if !self.frames.contains_key(&key) {
-            let readout = Readout::new(&self.profile, Mode::Raster, &self.skin.layout, self.device, 0)?;
-            let cells = Cells { rows: rows.clone(), plus: self.plus.0, faults: Arc::clone(&self.faults) };
-            let mut wire = TouchWire::of(readout.with_codes(|_| Ok(Box::new(cells.clone())))?);
+            let mut wire = TouchWire::of(build(self)?);
             let idle = self.idle(&mut wire, all)?;
             self.frames.insert(key, (wire, idle));
         }
+        Ok(())
+    }
+
+    /// The samples at the rows `measured` of the readout with the key `key`.
+    fn measure(&mut self, key: usize, measured: Range<usize>) -> Result<WireFrame, Refusal> {
         let alarm_v = self.alarm_v(self.frames.get(&key).map_or(0.0, |(_, idle)| idle.sd_v));
         let Held { source, number, frame, clock_s, .. } = &mut self.held;
         let Some((wire, idle)) = self.frames.get_mut(&key) else { return Err(Refusal::new("no frame")) };
         // the block's time begins with its first row
-        let before_s = measured.start as f64 * self.skin.period_s;
+        let each_s = self.skin.period_s / self.skin.wires.max(1) as f64;
+        let before_s = measured.start as f64 * each_s;
         let mut now = source.starting_at(*clock_s - before_s);
         let mut volts = wire.volts_of(&mut now, [*number * FRAMES + *frame, measured.start as u64], measured.len())?;
-        (*frame, *clock_s) = (*frame + 1, *clock_s + measured.len() as f64 * self.skin.period_s);
+        (*frame, *clock_s) = (*frame + 1, *clock_s + measured.len() as f64 * each_s);
         volts.iter_mut().zip(&idle.volts[measured]).for_each(|(v, idle)| *v -= idle);
         Ok(WireFrame { volts, alarm_v })
     }
@@ -203,8 +232,7 @@ impl<'a> WireSession<'a> {
         self.spend(count)
     }
 
-    /// A frame of `measurements` rows of ±1, in units of the conductance of a taxel at level 1 times volts a siemens:
-    /// y = Φ x. Other rows need another `key`.
+    /// A frame of `measurements` rows of ±1, as sums of conductances, µS: y = Φ x. Other rows need another `key`.
     ///
     /// # Errors
     /// [`Refusal`] if the rows belong to another skin, or more is asked for than is left.
@@ -215,10 +243,64 @@ impl<'a> WireSession<'a> {
         measurements: usize,
     ) -> Result<WireFrame, Refusal> {
         self.spend(measurements)?;
-        let mut frame = self.frame(key, rows, measurements, 0..measurements)?;
-        frame.volts.iter_mut().for_each(|v| *v /= self.plus.1);
-        frame.alarm_v /= self.plus.1;
-        Ok(frame)
+        let frame = self.frame(key, rows, measurements, 0..measurements)?;
+        Ok(self.in_units(frame))
+    }
+
+    /// A frame of the first `measurements` rows of `weights` of ±1, which may be those of several wires, as
+    /// [`WireSession::signs`] gives it.
+    ///
+    /// # Errors
+    /// As [`WireSession::signs`].
+    pub fn given(&mut self, key: usize, weights: &Weights, measurements: usize) -> Result<WireFrame, Refusal> {
+        self.spend(measurements)?;
+        self.built(key, measurements, |session| {
+            let wires = weights.wires().map_or_else(Vec::new, Wires::entries);
+            let profile = Profile { weights: CompressiveWeights::Binary, wires, ..session.profile.clone() };
+            let readout = Readout::new(&profile, Mode::Compressive, &session.skin.layout, session.device, 0)?;
+            readout.with_codes(|own| Ok(Box::new(session.cells(Signs(own.clone())))))
+        })?;
+        let frame = self.measure(key, 0..measurements)?;
+        Ok(self.in_units(frame))
+    }
+
+    /// Samples at `rows` of levels in [−1, 1], one level a taxel, as sums of conductances, µS.
+    ///
+    /// # Errors
+    /// As [`WireSession::signs`].
+    pub fn levels(&mut self, rows: &[Vec<f64>]) -> Result<Vec<f64>, Refusal> {
+        self.spend(rows.len())?;
+        // 0 and the opposite of the positive level are codes that there are; others are the nearest
+        let code = |level: &f64| match *level {
+            0.0 => NEUTRAL,
+            1.0 => u8::MAX,
+            -1.0 => 0,
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "in [0, 255]")]
+            level => (127.5 + 127.5 * self.plus.1 * level).round().min(254.0) as u8,
+        };
+        let codes = Patterns::new(rows.len(), rows.iter().flatten().map(code).collect())?;
+        let now = self.held.source.at(self.held.clock_s);
+        for row in rows {
+            let sum: f64 = row.iter().zip(now.values()).map(|(level, g)| level * g).sum();
+            self.largest_sum_s = self.largest_sum_s.max(sum.abs());
+        }
+        // rows that are asked for once
+        self.frames.remove(&ONCE);
+        let frame = self.frame(ONCE, &codes, rows.len(), 0..rows.len())?;
+        Ok(self.in_units(frame).volts)
+    }
+
+    /// Largest magnitude of the sums that [`WireSession::levels`] was asked for, S.
+    pub(super) fn largest_sum_s(&self) -> f64 {
+        self.largest_sum_s
+    }
+
+    /// `frame` as sums of conductances, µS, with weights of ±1.
+    fn in_units(&self, mut frame: WireFrame) -> WireFrame {
+        let unit_v = UNIT_S * self.profile.volts_per_siemens() * self.plus.1;
+        frame.volts.iter_mut().for_each(|v| *v /= unit_v);
+        frame.alarm_v /= unit_v;
+        frame
     }
 
     /// Row `row` of `rows`, of which there are `all`: a sample by itself, and the alarm.
@@ -295,6 +377,25 @@ impl<'a> WireSession<'a> {
 /// Keys of scans and of single rows.
 const SCAN: usize = usize::MAX;
 const SINGLE: usize = usize::MAX - 1;
+/// Key of rows that are asked for once.
+const ONCE: usize = usize::MAX - 2;
+
+/// The signs of weights.
+#[derive(Clone)]
+struct Signs(Weights);
+
+impl CellCodes for Signs {
+    fn taxels(&self) -> usize {
+        self.0.taxels()
+    }
+
+    fn codes(&mut self, first_row: u64, out: &mut [u8]) -> Result<(), Refusal> {
+        let mut levels = vec![0.0; out.len()];
+        self.0.fill_rows(first_row, &mut levels);
+        out.iter_mut().zip(levels).for_each(|(code, level)| *code = if level > 0.0 { u8::MAX } else { 0 });
+        Ok(())
+    }
+}
 
 /// Cells that put out rows of the codes 0, 255 and neutral, some of which are faulty.
 #[derive(Clone)]
@@ -358,6 +459,8 @@ pub struct SkinWire {
     pub layout: SkinLayout,
     /// Duration of a measurement, s.
     pub period_s: f64,
+    /// Wires that are measured at once; each has part of the measurements.
+    pub wires: usize,
 }
 
 impl SkinWire {
@@ -366,7 +469,7 @@ impl SkinWire {
     ///
     /// # Errors
     /// [`Refusal`] if the electronics cannot be built.
-    pub fn new(layout: SkinLayout, largest_s: &[f64]) -> Result<Self, Refusal> {
+    pub fn new(layout: SkinLayout, wires: usize, largest_s: &[f64]) -> Result<Self, Refusal> {
         let electronics = ElectronicsStudy::as_designed()?;
         let fitted = Fitted::new(largest_s, Seeding::Mixed, &electronics)?;
         Ok(Self {
@@ -379,7 +482,18 @@ impl SkinWire {
             period_s: fitted.period_s,
             electronics,
             layout,
+            wires,
         })
+    }
+
+    /// The wire of `task`, for the largest of its touches to learn from.
+    ///
+    /// # Errors
+    /// As [`SkinWire::new`].
+    pub(super) fn of(task: &Task, training: &[Touch]) -> Result<Self, Refusal> {
+        let sum = |touch: &Touch| touch.conductance_s.sum();
+        let largest = training.iter().max_by(|a, b| sum(a).total_cmp(&sum(b)));
+        Self::new(task.layout()?, task.wires, largest.map_or(&[][..], |touch| touch.conductance_s.values()))
     }
 
     /// A session of an entrant with the largest sum `largest_sum_s`, S. The feedback is the largest for which the sum
@@ -415,6 +529,7 @@ impl SkinWire {
             contact_noise,
             device,
             faults,
+            largest_sum_s: 0.0,
             held: Held {
                 source: Interpolated::new(vec![0.0], vec![ConductanceMap::zeros(1, 1)])?,
                 number: u64::MAX,
@@ -493,7 +608,7 @@ mod tests {
     fn wire(side: usize) -> SkinWire {
         let mut touch = vec![0.0; side * side];
         touch[..25].fill(150e-6);
-        SkinWire::new(SkinLayout::with_pitch(side, side, 15e-3).unwrap(), &touch).unwrap()
+        SkinWire::new(SkinLayout::with_pitch(side, side, 15e-3).unwrap(), 1, &touch).unwrap()
     }
 
     /// By hand: 14.9 V · 0.7 / 3.3 V over the sum, unless the output would not settle.
