@@ -232,11 +232,8 @@ fn choice(who: &str, track: Option<Track>) -> Result<Choice, Refusal> {
     let named = Choice::named(who, track);
     let program = who.split_whitespace().nth(1).is_some() || who.contains('=') || Path::new(who).is_file();
     match named {
-        Err(_) if who.ends_with(".py") && !who.contains(' ') => {
-            if !Path::new(who).is_file() {
-                return Err(Refusal::new("no such file").at(who));
-            }
-            Choice::python(Path::new(who), track)
+        Err(_) if who.ends_with(".py") && !who.contains([' ', '=']) && !Path::new(who).is_file() => {
+            Err(Refusal::new("no such file").at(who))
         }
         Err(_) if program => Ok(Choice::program(who, track)),
         other => other,

@@ -71,12 +71,14 @@ use std::time::Duration;
   spts score recordings/ --in-time --left-out
   spts score --twin --anytime --decoder evidence --confidence 0.9,0.95
   spts score recordings/ --external 'mine=python3 my_decoder.py' --decoder matched
+  spts score recordings/ --left-out --external my_class.py
   spts score recordings/ --save board.json
   spts score --twin --quick
   spts score --twin my_skin.toml --external 'mine=python3 my_decoder.py' --measurements 20,50
   spts score recordings/ --against board.json --tolerance 0.005 || echo regression
 
-An external program (--external) is run by the shell. It reads a header line {\"taxels\", \"rows\", \"cols\", \"left_out\",
+An external program (--external) is run by the shell; a Python file with a class that has fit(train) and predict(phi, y)
+needs no protocol (docs/benchmark.md). It reads a header line {\"taxels\", \"rows\", \"cols\", \"left_out\",
 \"classes\": {\"1\": \"brain\", ...}, \"learn\": {\"images\": [[...], ...], \"labels\": [...]}} and then one line a window, {\"m\",
 \"phi\": [\"+-+...\", ...], \"y\", \"volts\"}, and answers each at once with a line {\"image\": [...]} or {\"label\": N} or both.
 learn has the raster images to learn from and their labels. m is the number of samples, volts the samples, and y the

@@ -7,6 +7,9 @@
 //! answers each window with a line `{"image": […]}` or `{"label": …}` (null: unknown) or both, before it waits for the
 //! next window. When its input ends, it must end with status 0.
 //!
+//! A command may also be a Python file with a class of methods `fit(train)` and `predict(phi, y)`, for which a program
+//! of ours speaks (docs/benchmark.md).
+//!
 //! A label must be one of the header's classes, and an image must have one finite value a taxel. Any other answer, an
 //! additional answer, a bad exit status, or exceeding [`ExternalCommand::limit`] for a window ends the scoring with an
 //! error. When `spts` ends, for whatever reason, it also ends the program and all processes in its group.
@@ -22,6 +25,7 @@ use serde::Deserialize;
 use serde_json::json;
 use spts_input::Refusal;
 use std::collections::BTreeMap;
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::sync::mpsc::RecvTimeoutError;
 use std::sync::{Arc, Mutex, PoisonError};
@@ -32,7 +36,7 @@ use std::time::{Duration, Instant};
 pub struct ExternalCommand {
     /// Name.
     pub name: String,
-    /// The command for the shell.
+    /// The command for the shell, or a Python file with a class.
     pub command: String,
     /// Time limit for the answer to a window, and for the end after the last answer. Range:
     /// [`ExternalCommand::LIMIT_S`].
@@ -47,12 +51,38 @@ impl ExternalCommand {
     /// Default of [`ExternalCommand::limit`].
     pub const DEFAULT_LIMIT: Duration = Duration::from_secs(60);
 
-    /// Parses `NAME=COMMAND`, or a command that is its own name. A name has only letters, digits, `-` and `_`.
+    /// Parses `NAME=COMMAND`, or a command that is its own name. A name has only letters, digits, `-` and `_`. A class
+    /// in a Python file has the name of the file.
     pub fn parse(text: &str) -> Self {
         let is_name = |s: &str| !s.is_empty() && s.chars().all(|c| c.is_alphanumeric() || "-_".contains(c));
-        let (name, command) = text.split_once('=').filter(|(name, _)| is_name(name)).unwrap_or((text, text));
+        let own =
+            if class_of(text).is_some() { Path::new(text).file_stem().and_then(|stem| stem.to_str()) } else { None };
+        let own = (own.unwrap_or(text), text);
+        let (name, command) = text.split_once('=').filter(|(name, _)| is_name(name)).unwrap_or(own);
         let (limit, first) = (Self::DEFAULT_LIMIT, Self::DEFAULT_LIMIT);
         Self { name: name.to_owned(), command: command.to_owned(), limit, first }
+    }
+}
+
+/// Program in Python that speaks for a class.
+const ADAPTER: &str = include_str!("../../assets/entrant.py");
+/// Largest file of a class, bytes.
+const MOST_BYTES: u64 = 10_000_000;
+
+/// The text of the Python file `command`, if it is one with a class that has a method `predict` or `read`.
+pub fn class_of(command: &str) -> Option<String> {
+    let path = Path::new(command);
+    let python = path.extension().is_some_and(|extension| extension == "py") && path.is_file();
+    let text = if python { spts_input::read_text(path, MOST_BYTES).ok()? } else { return None };
+    ["predict", "read"].iter().any(|method| text.contains(&format!("def {method}("))).then_some(text)
+}
+
+/// What the shell runs for `command`.
+fn program_of(command: &str) -> String {
+    let quoted = |text: &str| format!("'{}'", text.replace('\'', "'\\''"));
+    match class_of(command) {
+        Some(_) => format!("python3 -c {} {}", quoted(ADAPTER), quoted(command)),
+        None => command.to_owned(),
     }
 }
 
@@ -172,7 +202,7 @@ impl Stream {
         values: usize,
     ) -> Result<Self, Refusal> {
         let mut shell = Command::new("sh");
-        shell.arg("-c").arg(command).stdin(Stdio::piped()).stdout(Stdio::piped());
+        shell.arg("-c").arg(program_of(command)).stdin(Stdio::piped()).stdout(Stdio::piped());
         let mut process = Process::start(&mut shell).map_err(|e| broken(command, e))?;
         let child = process.child();
         let (Some(input), Some(output)) = (child.stdin.take(), child.stdout.take()) else {

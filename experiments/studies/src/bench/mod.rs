@@ -38,7 +38,7 @@ use spts_circuit::{Seeding, WeightMode, Weights, WireConfig, Wires};
 use spts_eval::Labels;
 use spts_eval::algorithm::Class;
 use spts_eval::decoders::{AUTO, DECODERS, DecoderSpec, Needs, TrainedDecoder, auto, find};
-use spts_eval::external::ExternalCommand;
+use spts_eval::external::{ExternalCommand, class_of};
 use spts_eval::training::TrainingData;
 use spts_input::Refusal;
 use spts_models::{SkinLayout, Streams};
@@ -46,7 +46,6 @@ use spts_recon::Matrix;
 use spts_recon::recover::ImagePrior;
 use spts_recon::rows::{DESIGNERS, Designer, Expected, RowNeeds, RowTask, Tolerances, designer};
 use std::path::Path;
-use std::sync::Arc;
 use std::time::Duration;
 
 /// A way to read and decode a skin, built for one task.
@@ -206,9 +205,6 @@ pub struct Choice {
     kind: Kind,
     /// The program as the user wrote it.
     command: Option<String>,
-    /// The file of the program that speaks for a Python class.
-    #[expect(dead_code, reason = "it is there as long as this is")]
-    script: Option<Arc<tempfile::NamedTempFile>>,
 }
 
 #[derive(Clone)]
@@ -220,10 +216,6 @@ enum Kind {
     Program(ExternalCommand),
 }
 
-/// Program in Python that speaks for a class.
-const ADAPTER: &str = include_str!("../../assets/entrant.py");
-/// Largest file of a class, bytes.
-const MOST_BYTES: u64 = 10_000_000;
 /// Time for one answer of a program.
 const DEADLINE: Duration = Duration::from_secs(10);
 /// Time to learn, with the first answer.
@@ -242,24 +234,15 @@ impl Choice {
             let names: Vec<String> = Track::ALL.into_iter().filter(|of| on(*of)).flat_map(Self::names).collect();
             Refusal::new(format!("no entrant is called {name:?}; valid: {}", names.join(", ")))
         })?;
-        Ok(Self { name: name.to_owned(), track, kind, command: None, script: None })
+        Ok(Self { name: name.to_owned(), track, kind, command: None })
     }
 
-    /// A program on `track`. As a decoder, it is one that `--external` of `spts score` takes.
+    /// A program on `track`, as `--external` of `spts score` takes it; or the class in a Python file, which is on the
+    /// track of the methods that it has: `predict`, `rows` too, or `read`.
     pub fn program(text: &str, track: Option<Track>) -> Self {
         let command = ExternalCommand { limit: DEADLINE, first: LEARNING, ..ExternalCommand::parse(text) };
-        let (name, said) = (command.name.clone(), Some(text.to_owned()));
-        let (track, script) = (track.unwrap_or(Track::Decoder), None);
-        Self { name, track, kind: Kind::Program(command), command: said, script }
-    }
-
-    /// The class in a Python file, which is on the track of the methods that it has: `predict`, `rows` too, or `read`.
-    ///
-    /// # Errors
-    /// [`Refusal`] if the file cannot be read, or there is no place for the program that speaks for it.
-    pub fn python(file: &Path, track: Option<Track>) -> Result<Self, Refusal> {
-        let text = spts_input::read_text(file, MOST_BYTES)?;
-        let has = |method: &str| text.contains(&format!("def {method}("));
+        let class = class_of(&command.command).unwrap_or_default();
+        let has = |method: &str| class.contains(&format!("def {method}("));
         let own = if has("read") {
             Track::Readout
         } else if has("rows") {
@@ -267,15 +250,8 @@ impl Choice {
         } else {
             Track::Decoder
         };
-        let script = tempfile::Builder::new().prefix("spts-").suffix(".py").tempfile();
-        let script = script.and_then(|script| std::fs::write(script.path(), ADAPTER).map(|()| script));
-        let script = script.map_err(Refusal::from_error)?;
-        let quoted = |path: &Path| format!("'{}'", path.to_string_lossy().replace('\'', "'\\''"));
-        let command = format!("python3 {} {}", quoted(script.path()), quoted(file));
-        let name = file.file_stem().map_or_else(|| "python".into(), |stem| stem.to_string_lossy().into_owned());
-        let said = Some(file.to_string_lossy().into_owned());
-        let program = Self::program(&command, track.or(Some(own)));
-        Ok(Self { name, command: said, script: Some(Arc::new(script)), ..program })
+        let (name, track, said) = (command.name.clone(), track.unwrap_or(own), Some(text.to_owned()));
+        Self { name, track, kind: Kind::Program(command), command: said }
     }
 
     /// Whether it is a program.
@@ -290,7 +266,9 @@ impl Choice {
 
     /// SHA-256 of the last word of a program's command that is a file.
     pub(crate) fn sha256(&self) -> Option<String> {
-        let words = self.command()?.split_whitespace().map(|word| Path::new(word.trim_matches('\'')));
+        let command = self.command()?;
+        let command = command.split_once('=').map_or(command, |(_, command)| command);
+        let words = command.split_whitespace().map(|word| Path::new(word.trim_matches('\'')));
         let file = words.rev().find(|path| path.is_file())?;
         std::fs::read(file).ok().map(|bytes| tasks::in_digits(&bytes))
     }
@@ -381,10 +359,13 @@ impl Prepared {
     }
 
     fn trained(&self, spec: &DecoderSpec) -> Result<TrainedDecoder, Refusal> {
-        let data = if spec.needs == Needs::Shapes {
-            TrainingData::for_shapes(&self.layout, self.streams)?
-        } else {
-            self.images()?
+        let data = match spec.needs {
+            // nothing is learned there, and a decoder that has to is refused
+            _ if self.layout.taxels() > TrainingData::MOST_TAXELS => {
+                TrainingData::for_layout(&self.layout, self.streams)?
+            }
+            Needs::Shapes => TrainingData::for_shapes(&self.layout, self.streams)?,
+            _ => self.images()?,
         };
         TrainedDecoder::new(spec, &data)
     }
@@ -413,6 +394,7 @@ mod tests {
     use super::*;
     use crate::touches::TouchScore;
     use spts_models::ConductanceMap;
+    use std::sync::Arc;
 
     /// IoU with many measurements of a contact that stands out, at least: two thirds of the taxels are right.
     const LEAST_IOU: f64 = 0.6;

@@ -54,7 +54,7 @@ train = SimpleNamespace(
     labels=[names.get(number) for number in header["learn"]["labels"]],
     rows=header["rows"],
     cols=header["cols"],
-    measurements=header["measurements"],
+    measurements=header.get("measurements", []),
 )
 if hasattr(entrant, "fit"):
     entrant.fit(train)
