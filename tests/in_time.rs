@@ -47,7 +47,8 @@ fn simulated_presses_gain() {
 /// Two objects of the real skin, each left out, and its ball, by windows of 10 samples. A study of its own in numpy,
 /// on presses that are not scored, found an IoU of .80 to .91 in time and .40 to .58 alone during the rise, by windows
 /// of 20; and the place of the ball within .5 taxels from the third millisecond on. The bounds are the outer ends of
-/// 95 % intervals over objects and drops.
+/// 95 % intervals over objects and drops. That study began where the output is twice that of the untouched skin; the
+/// ten milliseconds before are fainter, and more than half of the support has to be right in them.
 #[test]
 fn the_real_skin_gains_in_rise_and_hold_and_on_drops() {
     let dir = tempfile::tempdir().unwrap();
@@ -58,8 +59,8 @@ fn the_real_skin_gains_in_rise_and_hold_and_on_drops() {
     let rise = rows(&board, "rows", "press", false);
     assert!(rise.len() >= 8, "{}", rise.len());
     for row in rise {
-        assert!(low(row, "iou_gain_ci", 0) > 0.2, "{row}");
-        assert!(of(row, "iou_in_time") > 0.75, "{row}");
+        let [gain, least] = if of(row, "since_touch_s") < 0.01 { [0.1, 0.5] } else { [0.2, 0.75] };
+        assert!(low(row, "iou_gain_ci", 0) > gain && of(row, "iou_in_time") > least, "{row}");
     }
     let held = rows(&board, "objects", "press", true);
     assert!(!held.is_empty());

@@ -15,7 +15,7 @@ use crate::algorithm::DecodeError;
 use crate::board::{Entry, TrainedBoard, no_session};
 use crate::decode::{no_recording, too_many, untrained};
 use crate::decoders::{TrainedDecoder, find, not_in_time, short_label};
-use crate::place::{RecordedBounce, contact_image, find_bounces, touch_of};
+use crate::place::{RecordedBounce, beginning_of, contact_image, find_bounces, touch_of};
 use crate::protocol::mask;
 use crate::scorer::Scorer;
 use crate::session::ScoredSession;
@@ -312,7 +312,7 @@ fn idle_noise(recording: &Recording, block: usize, untouched: &Untouched, touch:
 fn press(session: &ScoredSession, block: usize) -> Option<FollowedContact> {
     let recording = session.compressive.as_ref()?;
     let truth = session.truth(block)?;
-    let touch = touch_of(recording, block)?;
+    let touch = beginning_of(recording, block)?;
     let (rate_hz, per_frame) = (recording.sample_rate_hz(), recording.measurements_per_frame());
     let protocol = &session.protocol;
     let hold = protocol.first_frame..(protocol.first_frame + protocol.frames).min(recording.frames());

@@ -13,13 +13,13 @@ const QUIET_FRAMES: usize = 20;
 /// Touched when the output of a frame, without that of the untouched skin, is this many times as large as in the quiet
 /// frames.
 const THRESHOLD: f64 = 2.0;
-/// The touch begins with the first of the frames before that which are so many times as large: four standard
-/// deviations, 1/√200, of a frame of 100 samples of noise.
+/// What is followed in time begins with the first of the frames before that which are so many times as large: four
+/// standard deviations, 1/√200, of a frame of 100 samples of noise.
 const BEGINNING: f64 = 1.3;
 /// A touch lasts for at least as many frames.
 const SHORTEST_FRAMES: usize = 5;
 /// Frames before a touch that the untouched skin is not estimated from.
-const MARGIN_FRAMES: usize = 10;
+const MARGIN_FRAMES: usize = 5;
 
 /// A touch found in a recording that does not say when it is touched: measurements `start..end` of a block.
 #[derive(Debug, Clone, PartialEq)]
@@ -44,6 +44,17 @@ pub fn find_touches(recording: &Recording) -> Vec<RecordedTouch> {
 
 /// The touch of block `block`.
 pub(crate) fn touch_of(recording: &Recording, block: usize) -> Option<RecordedTouch> {
+    touch_from(recording, block, THRESHOLD)
+}
+
+/// The touch of block `block` from its faint beginning on.
+pub(crate) fn beginning_of(recording: &Recording, block: usize) -> Option<RecordedTouch> {
+    touch_from(recording, block, BEGINNING)
+}
+
+/// The touch of block `block`, from the first frame on whose output is `beginning` times that of the quiet ones, and
+/// all up to the sure ones too.
+fn touch_from(recording: &Recording, block: usize, beginning: f64) -> Option<RecordedTouch> {
     if recording.frames() < QUIET_FRAMES + SHORTEST_FRAMES {
         return None;
     }
@@ -58,7 +69,7 @@ pub(crate) fn touch_of(recording: &Recording, block: usize) -> Option<RecordedTo
         let touched = |frame: &[f64]| frame.iter().all(|level| *level > limit);
         let sure = levels[QUIET_FRAMES..].windows(SHORTEST_FRAMES).position(touched)? + QUIET_FRAMES;
         let before = levels[QUIET_FRAMES..sure].iter().rev();
-        let first = sure - before.take_while(|level| **level > BEGINNING / THRESHOLD * limit).count();
+        let first = sure - before.take_while(|level| **level > beginning / THRESHOLD * limit).count();
         let last = levels.iter().rposition(|level| *level > limit)?;
         found = Some(RecordedTouch { block, start: first * per_frame, end: (last + 1) * per_frame, untouched });
         quiet = first.saturating_sub(MARGIN_FRAMES).max(QUIET_FRAMES);

@@ -3,8 +3,8 @@
 mod contacts;
 mod locators;
 
-pub(crate) use contacts::touch_of;
 pub use contacts::{RecordedBounce, RecordedTouch, contact_image, find_bounces, find_touches};
+pub(crate) use contacts::{beginning_of, touch_of};
 pub use locators::locator_label;
 
 use crate::sensing::{Sensing, chosen_places};
