@@ -7,8 +7,9 @@ use crate::score::read_board;
 use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Subcommand, ValueEnum};
 use serde::Serialize;
-use spts::output::{write_json, write_npy};
+use spts::output::{check_replaceable, write_json, write_npy};
 use spts::session::parse_json;
+use spts_eval::unique;
 use spts_input::Refusal;
 use spts_report::bench::{leaderboard_text, ranking_text, text, write_leaderboard};
 use spts_report::write_all_or_none;
@@ -243,8 +244,14 @@ fn choice(who: &str, track: Option<Track>) -> Result<Choice, Refusal> {
 impl RunCommand {
     fn run(self) -> Result<(), CliError> {
         self.common.start()?;
+        if let Some(file) = &self.save {
+            if let Some(folder) = file.parent().filter(|folder| !folder.as_os_str().is_empty()) {
+                std::fs::create_dir_all(folder).map_err(|e| Refusal::from_error(e).at(folder.display()))?;
+            }
+            check_replaceable(file, |file| read(file).is_ok())?;
+        }
         let bench = Bench::new(choice(&self.who, self.track.map(Track::from))?);
-        let tasks = if self.tasks.is_empty() { bench.tasks.clone() } else { self.tasks };
+        let tasks = if self.tasks.is_empty() { bench.tasks.clone() } else { unique(self.tasks) };
         let split = match (self.public, self.seed) {
             (true, _) => Split::Public,
             (false, Some(seed)) => Split::Fresh(seed),
@@ -252,9 +259,6 @@ impl RunCommand {
         };
         let card = Bench { tasks, split, quick: self.quick, ..bench }.run(&Bars::default())?;
         if let Some(file) = &self.save {
-            if let Some(folder) = file.parent().filter(|folder| !folder.as_os_str().is_empty()) {
-                std::fs::create_dir_all(folder).map_err(|e| Refusal::from_error(e).at(folder.display()))?;
-            }
             write_json(file, &card)?;
         }
         self.common.print(&card, || text(&card))

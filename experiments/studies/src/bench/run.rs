@@ -1,7 +1,7 @@
 //! Runs an entrant on the tasks, and scores its answers.
 
 use super::card::{Card, Entry, Interval, TaskCard, spread};
-use super::rows::CodeDivision;
+use super::rows::{CodeDivision, RowsAndDecoder};
 use super::tasks::{SUITE, SkinTrials, Split, Subject, Task, Trial, digest};
 use super::wire::SkinWire;
 use super::{Choice, Entrant, Prepared, Reader, Reading, Track, UNIT_S};
@@ -13,12 +13,12 @@ use spts::provenance::{Machine, Provenance};
 use spts_circuit::WeightRows;
 use spts_eval::Labels;
 use spts_eval::algorithm::Class;
+use spts_eval::decoders::DECODERS;
 use spts_input::Refusal;
 use spts_models::{SkinLayout, Streams};
 use spts_recon::Matrix;
 use spts_recon::localise::centre_of_mass;
 use spts_recon::metrics::{SUPPORT_THRESHOLD, median};
-use spts_recon::operator::LinearOperator as _;
 use spts_recon::statistics::mean;
 
 /// A run of the benchmark.
@@ -61,12 +61,8 @@ impl Development {
         let prepared = Prepared { layout, wires: task.wires, measurements, training, labels, streams };
         let weights = prepared.weights()?;
         let phi = Matrix::from_rows(most, layout.taxels(), WeightRows::new(&weights, 0, most).to_vec())?;
-        let mut sums = vec![0.0; most];
-        let of = |touch: &Touch| {
-            phi.apply(touch.conductance_s.values(), &mut sums);
-            sums.iter().fold(0.0_f64, |largest, sum| largest.max(sum.abs()))
-        };
-        let largest_sum_s = prepared.training.iter().map(of).fold(0.0, f64::max);
+        let given = RowsAndDecoder::given(&weights, &prepared.measurements, prepared.trained(&DECODERS[0])?)?;
+        let largest_sum_s = wire.largest_sum_s(&given, &prepared.training);
         let (mut y, mut images, mut names) = (Vec::new(), Vec::new(), Vec::new());
         for skin in task.skins(Split::Public, false)? {
             let mut session = wire.session(largest_sum_s, skin.device, skin.faults.clone())?;
@@ -206,12 +202,7 @@ impl Judge<'_> {
         prepared: &Prepared,
         skins: &[SkinTrials],
     ) -> Result<Vec<Answers>, Refusal> {
-        let idle_s = wire.electronics.skin.idle_s;
-        let sums = prepared.training.iter().map(|touch| {
-            let whole: Vec<f64> = touch.conductance_s.values().iter().map(|g| g + idle_s).collect();
-            entrant.largest_sum_s(&whole)
-        });
-        let mut largest_sum_s = sums.fold(0.0, f64::max);
+        let mut largest_sum_s = wire.largest_sum_s(entrant, &prepared.training);
         if entrant.learns_its_sums() {
             largest_sum_s = learned_sum_s(entrant, wire, prepared)?;
         }
@@ -287,12 +278,7 @@ impl Judge<'_> {
     fn ceiling(&self, wire: &SkinWire, training: &[Touch], skins: &[SkinTrials]) -> Result<f64, Refusal> {
         let taxels = self.layout.taxels();
         let entrant = CodeDivision { taxels };
-        let idle_s = wire.electronics.skin.idle_s;
-        let sums = training.iter().map(|touch| {
-            let whole: Vec<f64> = touch.conductance_s.values().iter().map(|g| g + idle_s).collect();
-            entrant.largest_sum_s(&whole)
-        });
-        let largest_sum_s = sums.fold(0.0, f64::max);
+        let largest_sum_s = wire.largest_sum_s(&entrant, training);
         let each = skins.par_iter().map(|skin| {
             let held =
                 |trial: &Trial| trial.moments.iter().map(|(_, truth)| Trial::held(truth.clone())).collect::<Vec<_>>();

@@ -1,8 +1,8 @@
 //! The common wire as an entrant sees it.
 
-use super::UNIT_S;
 use super::rows::OneByOne;
 use super::tasks::{Fault, Task, Trial};
+use super::{Entrant, UNIT_S};
 use crate::electronics::ElectronicsStudy;
 use crate::touches::{Touch, TouchWire};
 use crate::wiring::{Fitted, amplifier, bisected, pressed_skin, sums};
@@ -494,6 +494,16 @@ impl SkinWire {
         let sum = |touch: &Touch| touch.conductance_s.sum();
         let largest = training.iter().max_by(|a, b| sum(a).total_cmp(&sum(b)));
         Self::new(task.layout()?, task.wires, largest.map_or(&[][..], |touch| touch.conductance_s.values()))
+    }
+
+    /// Largest magnitude of the sums, S, that `entrant` has with `touches`.
+    pub(super) fn largest_sum_s(&self, entrant: &dyn Entrant, touches: &[Touch]) -> f64 {
+        let idle_s = self.electronics.skin.idle_s;
+        let sums = touches.iter().map(|touch| {
+            let whole: Vec<f64> = touch.conductance_s.values().iter().map(|g| g + idle_s).collect();
+            entrant.largest_sum_s(&whole)
+        });
+        sums.fold(0.0, f64::max)
     }
 
     /// A session of an entrant with the largest sum `largest_sum_s`, S. The feedback is the largest for which the sum
