@@ -1,11 +1,15 @@
 """Rows of signs that are learned by straight-through gradients, after GLODISMO (Sauder, Genzel, Jung, arXiv 2202.03391),
 here of the error of a linear estimate; decoded by a non-negative lasso over the images."""
 
+import warnings
+
 import jax
 import jax.numpy as jnp
 import numpy as np
 import optax
 from sklearn.linear_model import Lasso
+
+warnings.filterwarnings("ignore")
 
 
 class LearnedRows:
