@@ -53,7 +53,10 @@ fn a_card_does_not_depend_on_the_threads_and_is_verified() {
     let differs = spts(dir.path(), &words("bench verify cards/1.json"));
     let said = String::from_utf8_lossy(&differs.stderr);
     assert!(differs.status.code() == Some(1) && said.contains("small.score at 7 measurements"), "{said}");
-    // both as a leaderboard
+    std::fs::write(&file, text.replace("\"official\": false", "\"official\": true")).unwrap();
+    let differs = spts(dir.path(), &words("bench verify cards/1.json"));
+    assert!(String::from_utf8_lossy(&differs.stderr).contains("`official`: the card has true; run again it is false"));
+    // as a leaderboard
     succeeds(dir.path(), &words("bench table cards/3.json --out board"));
     for name in ["index.html", "cards.json", "tables/leaderboard.csv", "figures/decoder.png"] {
         assert!(dir.path().join("board").join(name).is_file(), "{name}");

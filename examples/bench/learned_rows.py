@@ -1,4 +1,4 @@
-"""Rows of signs that are learned by straight-through gradients, after GLODISMO (Sauder, Genzel, Jung, arXiv 2202.03391),
+"""Rows of signs learned by straight-through gradients, after GLODISMO (Sauder, Genzel, Jung, arXiv 2202.03391),
 here of the error of a linear estimate; decoded by a non-negative lasso over the images."""
 
 import warnings

@@ -1,4 +1,4 @@
-"""Orthogonal matching pursuit of scikit-learn over the images to learn from, as many atoms as a third of the samples."""
+"""Orthogonal matching pursuit of scikit-learn over the images to learn from: an atom for three samples."""
 
 import numpy as np
 from sklearn.linear_model import orthogonal_mp

@@ -30,4 +30,5 @@ class Objective(BaseObjective):
         cosine = (images * self.images).sum(axis=1) / np.maximum(
             np.linalg.norm(images, axis=1) * np.linalg.norm(self.images, axis=1), 1e-300
         )
-        return {"value": 1 - iou.mean(), "iou": iou.mean(), "worst_tenth": np.quantile(iou, 0.1), "cosine": cosine.mean()}
+        worst = np.quantile(iou, 0.1)
+        return {"value": 1 - iou.mean(), "iou": iou.mean(), "worst_tenth": worst, "cosine": cosine.mean()}

@@ -126,7 +126,7 @@ impl Reader for &Adaptive {
         // all taxels are measured once, and the samples are those at the taxels that are asked for
         let count = wire.left().min(self.order.len());
         let frame = wire.whole_scan(self.order.len())?;
-        wire.choose(count)?;
+        wire.spend(count)?;
         let read = self.read_taxels(&frame, count);
         Ok(Reading::of(self.fill(&frame, &read, count)))
     }

@@ -98,8 +98,18 @@ impl Card {
         let differs = |what: &str, a: &dyn std::fmt::Display, b: &dyn std::fmt::Display| {
             Err(Refusal::new(format!("`{what}`: the card has {a}; run again it is {b}")))
         };
-        if self.suite != again.suite {
-            return differs("suite", &self.suite, &again.suite);
+        let texts = [
+            ("suite", &self.suite, &again.suite),
+            ("entrant", &self.entrant, &again.entrant),
+            ("split", &self.split, &again.split),
+        ];
+        if let Some((what, a, b)) = texts.into_iter().find(|(_, a, b)| a != b) {
+            return differs(what, a, b);
+        }
+        for (what, a, b) in [("quick", self.quick, again.quick), ("official", self.official, again.official)] {
+            if a != b {
+                return differs(what, &a, &b);
+            }
         }
         if self.program_sha256 != again.program_sha256 {
             let text = |sum: &Option<String>| sum.clone().unwrap_or_else(|| "none".to_owned());

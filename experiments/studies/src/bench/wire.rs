@@ -127,7 +127,7 @@ impl<'a> WireSession<'a> {
     }
 
     /// Takes `count` measurements off those that are left.
-    fn spend(&mut self, count: usize) -> Result<(), Refusal> {
+    pub(super) fn spend(&mut self, count: usize) -> Result<(), Refusal> {
         let left = self.held.left.checked_sub(count);
         let over = || Refusal::new(format!("{count} measurements are asked for; {} are left", self.held.left));
         self.held.left = left.ok_or_else(over)?;
@@ -221,15 +221,10 @@ impl<'a> WireSession<'a> {
         self.whole_scan(count)
     }
 
-    /// A scan of the first `count` taxels whose measurements are counted by [`WireSession::choose`].
+    /// A scan of the first `count` taxels, of which no measurement is taken off.
     pub(super) fn whole_scan(&mut self, count: usize) -> Result<WireFrame, Refusal> {
         let taxels = self.skin.layout.taxels();
         self.frame(SCAN, &OneByOne { taxels }, taxels, 0..count)
-    }
-
-    /// Counts the measurements of taxels that are chosen from a whole scan.
-    pub(super) fn choose(&mut self, count: usize) -> Result<(), Refusal> {
-        self.spend(count)
     }
 
     /// A frame of `measurements` rows of ±1, as sums of conductances, µS: y = Φ x. Other rows need another `key`.
