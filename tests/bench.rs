@@ -143,5 +143,5 @@ fn the_help_has_examples_and_the_list_names_all() {
     assert!(String::from_utf8_lossy(&help.stdout).contains("spts bench run mine.py --quick"));
     let listed = json(dir.path(), &words("bench list --json"));
     let tasks = listed["tasks"].as_array().unwrap();
-    assert_eq!((tasks.len(), &listed["suite"]), (15, &"touch-1".into()));
+    assert_eq!((tasks.len(), &listed["suite"]), (16, &"touch-1".into()));
 }

@@ -20,7 +20,7 @@ use std::path::{Path, PathBuf};
 
 /// The benchmark of few-wire touch: fixed tasks, the same wire for all, a card for every entrant.
 ///
-/// The suite touch-1 has fourteen tasks: images of shapes anywhere, classes, contacts at once, courses in time, drift,
+/// The suite touch-1 has sixteen tasks: images of shapes anywhere, classes, contacts at once, courses in time, drift,
 /// faults, up to 10,000 taxels. All touches follow from its seeds, so that nothing is downloaded. The protocol is
 /// docs/benchmark.md.
 #[derive(Debug, Args)]

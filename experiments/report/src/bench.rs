@@ -31,6 +31,9 @@ pub fn text(card: &Card) -> String {
         .number("µs", 0, |(.., time_us)| Some(time_us).filter(|time_us| *time_us > 0.0));
     let mut out = table.text();
     for task in &card.tasks {
+        if let Some((object, score)) = &task.worst {
+            out.push_str(&format!("{}: least score {score:.2}, {object}\n", task.task));
+        }
         if let Some(refused) = &task.refused {
             out.push_str(&format!("{}: not done, 0 points: {refused}\n", task.task));
         }
@@ -97,7 +100,7 @@ fn ranking_table(ranking: &Ranking) -> Table<'_, &Ranked> {
         .file("worst_iou", |d| d.worst.1)
         .file("worst_object", |d| &d.worst.0)
         .shown("worst", |d| format!("{} {:.2}", d.worst.0, d.worst.1))
-        .column("points", "points of small, thin, broad", |d| d.points)
+        .column("points", "points of middle", |d| d.points)
         .digits(1)
 }
 

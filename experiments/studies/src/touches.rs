@@ -21,6 +21,18 @@ pub(crate) enum TouchObjects {
     Objects,
 }
 
+/// Where an object lies.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum Place {
+    /// Anywhere on the sheet, in any rotation.
+    Anywhere,
+    /// So far from the middle of the sheet at most along both axes, m, in any rotation.
+    Within(f64),
+    /// At its published place and rotation, at the same distance in metres from the middle of any sheet. Only for
+    /// [`TouchObjects::Objects`].
+    Published,
+}
+
 /// Distance that the middle of an object keeps from the edge of the sheet, m, where the sheet is large enough.
 const MARGIN_M: f64 = 0.03;
 /// Objects lie within this share of the sheet's width and height at least, from the middle to both sides.
@@ -40,9 +52,8 @@ pub(crate) struct TouchScene {
     pub size_m: Option<[f64; 2]>,
     /// Place, m from the middle, rotation, degrees, and force, N, of every touch; `None` for random ones.
     pub pose: Option<[f64; 4]>,
-    /// Whether objects keep their published places and rotations, at the same distance in metres from the middle of any
-    /// sheet. Only for [`TouchObjects::Objects`].
-    pub placed: bool,
+    /// Where objects without a `pose` lie.
+    pub place: Place,
     /// Objects that are pressed at once.
     pub contacts: usize,
     /// Number of touches.
@@ -80,7 +91,7 @@ impl TouchScene {
     /// A scene with `touches` touches of `objects` on a skin.
     pub(crate) fn new(layout: SkinLayout, objects: TouchObjects, touches: usize, seed: u64) -> Self {
         let (families, size_m, pose, specimen) = (&[][..], None, None, None);
-        Self { layout, objects, families, size_m, pose, placed: false, contacts: 1, touches, seed, specimen }
+        Self { layout, objects, families, size_m, pose, place: Place::Anywhere, contacts: 1, touches, seed, specimen }
     }
 
     /// Presses all touches. The result depends only on the scene.
@@ -105,11 +116,14 @@ impl TouchScene {
     fn spec(&self) -> String {
         let layout = &self.layout;
         let [width_m, height_m] = layout.extent_m();
-        let share = |side_m: f64| (0.5 - MARGIN_M / side_m).max(LEAST_SHARE);
+        let share = |side_m: f64| match self.place {
+            Place::Within(reach_m) => reach_m / side_m,
+            Place::Anywhere | Place::Published => (0.5 - MARGIN_M / side_m).max(LEAST_SHARE),
+        };
         let (x, y) = (share(width_m), share(height_m));
         let (from, about) = match self.objects {
             TouchObjects::Shapes => ("shapes", "middle"),
-            TouchObjects::Objects => ("objects", if self.placed { "placement" } else { "middle" }),
+            TouchObjects::Objects => ("objects", if self.place == Place::Published { "placement" } else { "middle" }),
         };
         let mut size =
             self.size_m.map_or_else(String::new, |[least, most]| format!("size_m = [{least:e}, {most:e}]\n"));
@@ -120,7 +134,7 @@ impl TouchScene {
             Some([x_m, y_m, rotation_deg, _]) => {
                 format!("x_m = {x_m:e}\ny_m = {y_m:e}\nrotation_deg = {rotation_deg:e}\n")
             }
-            None if self.placed => String::new(),
+            None if self.place == Place::Published => String::new(),
             None => format!(
                 "x_share = {{ uniform = [{:e}, {x:e}] }}\ny_share = {{ uniform = [{:e}, {y:e}] }}\n\
                  rotation_deg = {{ uniform = [-180.0, 180.0] }}\n",

@@ -1,12 +1,14 @@
 //! Entrants that choose the next measurement by those before: taxels around a contact, and halves of a part that is
 //! touched.
 
+use super::rows::OneByOne;
 use super::wire::{NEUTRAL, WireFrame, WireSession};
 use super::{Entrant, Reader, Reading};
 use spts_circuit::CellCodes;
 use spts_input::Refusal;
 use std::collections::VecDeque;
 use std::ops::Range;
+use std::sync::Arc;
 
 /// Adaptive sub-sampling: single taxels on ever finer grids until one is touched; then its neighbours, and theirs,
 /// before the grids go on. Taxels that were not read are filled in from those that were.
@@ -59,19 +61,25 @@ impl Adaptive {
         })
     }
 
-    /// The taxels that are read, `count` at most, from the samples of all.
-    fn read_taxels(&self, frame: &WireFrame, count: usize) -> Vec<bool> {
-        let mut read = vec![false; self.order.len()];
+    /// Reads `count` taxels at most: which, and their samples. `sample` reads one: its volts, and the alarm.
+    fn read_taxels(
+        &self,
+        count: usize,
+        mut sample: impl FnMut(usize) -> Result<(f64, f64), Refusal>,
+    ) -> Result<(Vec<bool>, WireFrame), Refusal> {
+        let taxels = self.order.len();
+        let (mut read, mut frame) = (vec![false; taxels], WireFrame { volts: vec![0.0; taxels], alarm_v: 0.0 });
         let (mut near, mut grids) = (VecDeque::new(), self.order.iter().copied());
         for _ in 0..count {
             let next = std::iter::from_fn(|| near.pop_front()).chain(grids.by_ref()).find(|k: &usize| !read[*k]);
             let Some(taxel) = next else { break };
             read[taxel] = true;
+            (frame.volts[taxel], frame.alarm_v) = sample(taxel)?;
             if frame.volts[taxel] > frame.alarm_v {
                 near.extend(self.around(taxel, 1).filter(|k| !read[*k]));
             }
         }
-        read
+        Ok((read, frame))
     }
 
     /// Samples of the contacts where they were taken; elsewhere that of the nearest taxel that was read, or the mean of
@@ -81,12 +89,7 @@ impl Adaptive {
         let pitch = (self.order.len() as f64 / count.max(1) as f64).sqrt();
         #[expect(clippy::cast_possible_truncation, reason = "at most the side of the skin")]
         let reach = (1.5 * pitch).ceil() as usize;
-        // of the taxels that were read alone: the alarm of another one is not known
-        let known = WireFrame {
-            volts: (0..read.len()).map(|k| if read[k] { frame.volts[k] } else { 0.0 }).collect(),
-            alarm_v: frame.alarm_v,
-        };
-        let samples = known.contacts(self.cols);
+        let samples = frame.contacts(self.cols);
         // square of the distance to the nearest, the sum of those as near, and their number
         let mut nearest = vec![(usize::MAX, 0.0, 0_u32); read.len()];
         for taxel in (0..read.len()).filter(|k| read[*k]) {
@@ -123,98 +126,80 @@ impl Entrant for Adaptive {
 
 impl Reader for &Adaptive {
     fn read(&mut self, wire: &mut WireSession<'_>) -> Result<Reading, Refusal> {
-        // all taxels are measured once, and the samples are those at the taxels that are asked for
-        let count = wire.left().min(self.order.len());
-        let frame = wire.whole_scan(self.order.len())?;
-        wire.spend(count)?;
-        let read = self.read_taxels(&frame, count);
+        let (count, taxels) = (wire.left().min(self.order.len()), self.order.len());
+        let (read, frame) = self.read_taxels(count, |k| wire.single(0, || OneByOne { taxels }, taxels, k))?;
         Ok(Reading::of(self.fill(&frame, &read, count)))
     }
 }
 
 /// A binary search: the sum of a part of the sheet, and where it is beyond the alarm, of its halves, the largest part
-/// first. A part that was not divided has its sum spread over its taxels.
+/// first. A part that was not divided has its sum spread over its taxels, if it is half of a touched one.
 pub(super) struct BinarySearch {
-    parts: Parts,
+    /// Each before its halves. The first is all of the sheet.
+    parts: Vec<Part>,
+    /// Those of the same depth: so many halvings.
+    depths: Vec<Range<usize>>,
+    cols: usize,
 }
 
-/// Parts of a sheet, each before its halves: rows and columns. The first is all of it.
-#[derive(Clone)]
-struct Parts(Vec<(Range<usize>, Range<usize>)>, usize);
+/// Part of a sheet: rows and columns, and the number of the first of its halves.
+#[derive(Debug, Clone)]
+struct Part {
+    rows: Range<usize>,
+    cols: Range<usize>,
+    halves: Option<usize>,
+}
 
 /// The largest parts have a sixteenth of the taxels: sums of more would leave no volts to a taxel.
 const LARGEST_PART: usize = 16;
 
-impl Parts {
-    fn new(rows: usize, cols: usize) -> Self {
-        let mut parts = vec![(0..rows, 0..cols)];
-        let mut at = 0;
-        while let Some(part) = parts.get(at).cloned() {
-            parts.extend(halves(&part).into_iter().flatten());
-            at += 1;
+impl Part {
+    fn size(&self) -> usize {
+        self.rows.len() * self.cols.len()
+    }
+
+    /// Both halves along the longer side; `None` of a taxel.
+    fn halved(&self) -> Option<[Self; 2]> {
+        let middle = |range: &Range<usize>| range.start + range.len().div_ceil(2);
+        let of = |rows: Range<usize>, cols: Range<usize>| Self { rows, cols, halves: None };
+        let Self { rows, cols, .. } = self.clone();
+        if self.size() < 2 {
+            return None;
         }
-        Self(parts, cols)
+        Some(if rows.len() >= cols.len() {
+            let at = middle(&rows);
+            [of(rows.start..at, cols.clone()), of(at..rows.end, cols)]
+        } else {
+            let at = middle(&cols);
+            [of(rows.clone(), cols.start..at), of(rows, at..cols.end)]
+        })
     }
 
-    /// The numbers of the parts from which the search begins.
-    fn first(&self) -> Vec<usize> {
-        let taxels = self.size(0);
-        let small = |k: &usize| self.size(*k) * LARGEST_PART <= taxels;
-        // parts of which no larger one is small
-        let mut first: Vec<usize> = Vec::new();
-        for k in (0..self.0.len()).filter(small) {
-            let within = |k: usize, of: usize| {
-                let ((r, c), (rows, cols)) = (&self.0[k], &self.0[of]);
-                rows.start <= r.start && r.end <= rows.end && cols.start <= c.start && c.end <= cols.end
-            };
-            if !first.iter().any(|&of| within(k, of)) {
-                first.push(k);
-            }
-        }
-        first
+    /// Its taxels, of a sheet with `all` columns.
+    fn taxels(&self, all: usize) -> impl Iterator<Item = usize> + '_ {
+        self.rows.clone().flat_map(move |r| self.cols.clone().map(move |c| r * all + c))
     }
-
-    fn size(&self, part: usize) -> usize {
-        self.0[part].0.len() * self.0[part].1.len()
-    }
-
-    fn number(&self, part: &(Range<usize>, Range<usize>)) -> Option<usize> {
-        self.0.iter().position(|other| other == part)
-    }
-
-    fn taxels(&self, part: usize) -> impl Iterator<Item = usize> + '_ {
-        let (rows, cols) = &self.0[part];
-        rows.clone().flat_map(move |r| cols.clone().map(move |c| r * self.1 + c))
-    }
-}
-
-/// Both halves along the longer side; `None` of a taxel.
-fn halves((rows, cols): &(Range<usize>, Range<usize>)) -> Option<[(Range<usize>, Range<usize>); 2]> {
-    let middle = |range: &Range<usize>| range.start + range.len().div_ceil(2);
-    if rows.len() * cols.len() < 2 {
-        return None;
-    }
-    Some(if rows.len() >= cols.len() {
-        let at = middle(rows);
-        [(rows.start..at, cols.clone()), (at..rows.end, cols.clone())]
-    } else {
-        let at = middle(cols);
-        [(rows.clone(), cols.start..at), (rows.clone(), at..cols.end)]
-    })
 }
 
 /// Row k is part k at level 1.
-impl CellCodes for Parts {
+#[derive(Clone)]
+struct PartRows {
+    parts: Arc<[Part]>,
+    cols: usize,
+    taxels: usize,
+}
+
+impl CellCodes for PartRows {
     fn taxels(&self) -> usize {
-        self.size(0)
+        self.taxels
     }
 
     fn codes(&mut self, first_row: u64, out: &mut [u8]) -> Result<(), Refusal> {
         out.fill(NEUTRAL);
-        for (row, codes) in (first_row..).zip(out.chunks_exact_mut(self.size(0))) {
+        for (row, codes) in (first_row..).zip(out.chunks_exact_mut(self.taxels)) {
             #[expect(clippy::cast_possible_truncation, reason = "less than the number of parts")]
-            let part = (row % self.0.len() as u64) as usize;
-            self.taxels(part).for_each(|taxel| codes[taxel] = u8::MAX);
+            let part = (row % self.parts.len() as u64) as usize;
+            self.parts[part].taxels(self.cols).for_each(|taxel| codes[taxel] = u8::MAX);
         }
         Ok(())
     }
@@ -222,14 +207,42 @@ impl CellCodes for Parts {
 
 impl BinarySearch {
     pub(super) fn new(rows: usize, cols: usize) -> Self {
-        Self { parts: Parts::new(rows, cols) }
+        let mut parts = vec![Part { rows: 0..rows, cols: 0..cols, halves: None }];
+        let (mut depths, mut depth) = (Vec::new(), 0..1);
+        while !depth.is_empty() {
+            for part in depth.clone() {
+                if let Some(halves) = parts[part].halved() {
+                    parts[part].halves = Some(parts.len());
+                    parts.extend(halves);
+                }
+            }
+            let next = depth.end..parts.len();
+            depths.push(std::mem::replace(&mut depth, next));
+        }
+        Self { parts, depths, cols }
+    }
+
+    /// The numbers of the parts from which the search begins: those of a sixteenth of the sheet at most, of which no
+    /// larger one is.
+    fn first(&self) -> Vec<usize> {
+        let small = |part: &Part| part.size() * LARGEST_PART <= self.parts[0].size();
+        let mut first = Vec::new();
+        for part in self.parts.iter().filter(|part| !small(part)) {
+            let halves = part.halves.into_iter().flat_map(|k| [k, k + 1]);
+            first.extend(halves.filter(|k| small(&self.parts[*k])));
+        }
+        if self.parts.iter().all(|part| !small(part)) {
+            // a sheet of less than sixteen taxels: the taxels
+            first.extend((0..self.parts.len()).filter(|k| self.parts[*k].halves.is_none()));
+        }
+        first
     }
 }
 
 impl Entrant for BinarySearch {
     fn largest_sum_s(&self, conductance_s: &[f64]) -> f64 {
-        let sum = |part: &usize| self.parts.taxels(*part).map(|k| conductance_s[k]).sum::<f64>();
-        self.parts.first().iter().map(sum).fold(0.0, f64::max)
+        let sum = |part: &usize| self.parts[*part].taxels(self.cols).map(|k| conductance_s[k]).sum::<f64>();
+        self.first().iter().map(sum).fold(0.0, f64::max)
     }
 
     fn start(&self) -> Box<dyn Reader + '_> {
@@ -239,17 +252,20 @@ impl Entrant for BinarySearch {
 
 impl Reader for &BinarySearch {
     fn read(&mut self, wire: &mut WireSession<'_>) -> Result<Reading, Refusal> {
-        let all = self.parts.0.len();
-        let mut image = vec![0.0; self.parts.size(0)];
-        let mut next: VecDeque<usize> = self.parts.first().into();
-        while let Some(part) = next.pop_front().filter(|_| wire.left() > 0) {
-            let (volts, alarm_v) = wire.single(&self.parts, all, part)?;
-            let touched = volts > alarm_v;
-            let each = if touched { volts / self.parts.size(part) as f64 } else { 0.0 };
-            self.parts.taxels(part).for_each(|taxel| image[taxel] = each);
-            if let Some(halves) = halves(&self.parts.0[part]).filter(|_| touched) {
-                next.extend(halves.iter().filter_map(|half| self.parts.number(half)));
-            }
+        let taxels = self.parts[0].size();
+        let mut image = vec![0.0; taxels];
+        // parts, and whether they are halves of a touched one
+        let mut next: VecDeque<(usize, bool)> = self.first().into_iter().map(|part| (part, false)).collect();
+        while let Some((number, half)) = next.pop_front().filter(|_| wire.left() > 0) {
+            // parts of another depth have noise of their own, and another alarm
+            let depth = self.depths.iter().position(|depth| depth.contains(&number)).unwrap_or(0);
+            let first = self.depths[depth].start;
+            let rows = || PartRows { parts: self.parts[self.depths[depth].clone()].into(), cols: self.cols, taxels };
+            let (volts, alarm_v) = wire.single(depth, rows, self.depths[depth].len(), number - first)?;
+            let (part, touched) = (&self.parts[number], volts > alarm_v);
+            let each = if touched || half { volts.max(0.0) / part.size() as f64 } else { 0.0 };
+            part.taxels(self.cols).for_each(|taxel| image[taxel] = each);
+            next.extend(part.halves.filter(|_| touched).into_iter().flat_map(|k| [(k, true), (k + 1, true)]));
         }
         Ok(Reading::of(image))
     }
@@ -282,7 +298,7 @@ mod tests {
         for taxel in grids.around(8 * 32 + 8, 1) {
             frame.volts[taxel] = 1.0;
         }
-        let read = grids.read_taxels(&frame, 40);
+        let (read, frame) = grids.read_taxels(40, |k| Ok((frame.volts[k], frame.alarm_v))).unwrap();
         assert_eq!(read.iter().filter(|r| **r).count(), 40);
         assert!(grids.around(8 * 32 + 8, 2).all(|k| read[k]));
         let image = grids.fill(&frame, &read, 40);
@@ -296,10 +312,10 @@ mod tests {
     /// Every taxel is a part, every part is there once, and the first ones are the sheet.
     #[test]
     fn parts_divide_the_sheet() {
-        for (rows, cols) in [(10, 10), (7, 3)] {
-            let parts = Parts::new(rows, cols);
-            assert_eq!(parts.0.len(), 2 * rows * cols - 1);
-            let mut first: Vec<usize> = parts.first().into_iter().flat_map(|k| parts.taxels(k)).collect();
+        for (rows, cols) in [(10, 10), (7, 3), (2, 2)] {
+            let search = BinarySearch::new(rows, cols);
+            assert_eq!(search.parts.len(), 2 * rows * cols - 1);
+            let mut first: Vec<usize> = search.first().into_iter().flat_map(|k| search.parts[k].taxels(cols)).collect();
             first.sort_unstable();
             assert!(first.into_iter().eq(0..rows * cols), "{rows} × {cols}");
         }

@@ -51,6 +51,9 @@ pub struct TaskCard {
     pub entries: Vec<Entry>,
     /// 100 · (score − floor) / (ceiling − floor), in [0, 100], mean over the numbers of measurements.
     pub points: Interval,
+    /// The object, or the family of shapes, with the least mean score over all numbers of measurements, and that score.
+    #[serde(default)]
+    pub worst: Option<(String, f64)>,
     /// Why the entrant has no answer to this task; its points are 0.
     #[serde(skip_serializing_if = "Option::is_none", default)]
     pub refused: Option<String>,

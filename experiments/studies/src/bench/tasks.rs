@@ -2,7 +2,7 @@
 //! what is scored of it.
 
 use super::Track;
-use crate::touches::{Touch, TouchObjects, TouchScene};
+use crate::touches::{Place, Touch, TouchObjects, TouchScene};
 use rand::RngExt as _;
 use rand_distr::{Distribution as _, StandardNormal};
 use rayon::prelude::*;
@@ -11,7 +11,8 @@ use sha2::{Digest as _, Sha256};
 use spts_dataset::{Maker, Spec};
 use spts_input::Refusal;
 use spts_models::{ConductanceMap, SkinLayout, Streams};
-use std::sync::Arc;
+use std::collections::BTreeMap;
+use std::sync::{Arc, LazyLock};
 
 /// Name of the suite. Its tasks never change; others get another name.
 pub const SUITE: &str = "touch-1";
@@ -34,7 +35,7 @@ pub enum Subject {
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Scene {
     /// Objects that are held.
-    Held { objects: TouchObjects, placed: bool, families: &'static [&'static str], size_m: [f64; 2], contacts: usize },
+    Held { objects: TouchObjects, place: Place, families: &'static [&'static str], size_m: [f64; 2], contacts: usize },
     /// A shape that slides over the sheet.
     Sliding,
     /// A shape whose force grows.
@@ -82,12 +83,21 @@ const BROAD: &[&str] = &["plate", "blob", "foot", "hand", "union", "perforated"]
 const THIN: &[&str] = &["rods", "pads", "ring", "polyline"];
 
 const fn shapes(families: &'static [&'static str], size_m: [f64; 2], contacts: usize) -> Scene {
-    Scene::Held { objects: TouchObjects::Shapes, placed: false, families, size_m, contacts }
+    Scene::Held { objects: TouchObjects::Shapes, place: Place::Anywhere, families, size_m, contacts }
 }
 
-const fn objects(placed: bool) -> Scene {
-    Scene::Held { objects: TouchObjects::Objects, placed, families: &[], size_m: [0.02, 0.09], contacts: 1 }
+const fn objects(place: Place) -> Scene {
+    Scene::Held { objects: TouchObjects::Objects, place, families: &[], size_m: [0.02, 0.09], contacts: 1 }
 }
+
+/// Shapes where people put what they press.
+const MIDDLE: Scene = Scene::Held {
+    objects: TouchObjects::Shapes,
+    place: Place::Within(0.015),
+    families: &[],
+    size_m: [0.02, 0.09],
+    contacts: 1,
+};
 
 const fn task(name: &'static str, about: &'static str, scene: Scene) -> Task {
     let (measurements, more, touches) = (FEW, ALL, [4, 20]);
@@ -105,15 +115,20 @@ pub const TASKS: &[Task] = &[
     task("small", "shapes of 15 to 35 mm, anywhere", shapes(&[], [0.015, 0.035], 1)),
     task("thin", "rods, rings, lines and crosses of pads of 40 to 90 mm, anywhere", shapes(THIN, [0.04, 0.09], 1)),
     task("broad", "plates, soles, hands and blobs of 60 to 130 mm, anywhere", shapes(BROAD, [0.06, 0.13], 1)),
+    task("middle", "shapes of all kinds, within 15 mm of the middle", MIDDLE),
     Task {
         subject: Subject::Class,
         touches: [17, 34],
-        ..task("class_placed", "which of seventeen objects, where the published recordings have them", objects(true))
+        ..task(
+            "class_placed",
+            "which of seventeen objects, where the published recordings have them",
+            objects(Place::Published),
+        )
     },
     Task {
         subject: Subject::Class,
         touches: [17, 34],
-        ..task("class_anywhere", "which of seventeen objects, anywhere and turned", objects(false))
+        ..task("class_anywhere", "which of seventeen objects, anywhere and turned", objects(Place::Anywhere))
     },
     Task { touches: [2, 8], ..task("sliding", "a shape that slides at 50 to 400 mm/s, in time", Scene::Sliding) },
     Task {
@@ -150,114 +165,20 @@ pub const TASKS: &[Task] = &[
     },
 ];
 
-/// SHA-256 of the touches of the test split: task, with `--quick`, and without.
-const DIGESTS: &[(&str, [&str; 2])] = &[
-    (
-        "small",
-        [
-            "9bd914376077726f8663797cfd0b2d029c6ebe0b0ba2fc5b96deb56e25fed70a",
-            "fa57e09aa07038f222415dd708ddfd8d52c674f4dd3918dbf448708ff9ccbc76",
-        ],
-    ),
-    (
-        "thin",
-        [
-            "890dc32148d54a5609a58269155df123f67ab4ac87eee0c6273b38f01a20ec33",
-            "25ba1917db7400b2a313caef34cac256f38f2a357fb263b1174046b9186b8971",
-        ],
-    ),
-    (
-        "broad",
-        [
-            "f387e5d0d65f64820515181d3d5acb26da50ff44afdcd7d3c1eb9c8fa50d583c",
-            "a26257122ad74b687dc5dc7c45eb5390b513bd1c62b7498581e1301307311cac",
-        ],
-    ),
-    (
-        "class_placed",
-        [
-            "bd4f130aee5b28fff0c73ff543764a8715080e067a94c6f641f1ac2d36cea052",
-            "1f3740f8c5702005add39a3047e401d31b90b641fa4121afd050771d67c23809",
-        ],
-    ),
-    (
-        "class_anywhere",
-        [
-            "0ce30db8deaf769199175cd8011300daeaac100497349cfd20bb994c85bf8487",
-            "c0934159ad50a48250fa4e5f4a3cf292dae093504a680e0f30ab58f800df15a1",
-        ],
-    ),
-    (
-        "sliding",
-        [
-            "8bb61e6f7741781603567337550669c67f2ecfc1122db11711759245bf90163d",
-            "e3c8d6f1904aca5e5766e0d30e6e31fc1e6614d55f2be75fe91ca633699ebe94",
-        ],
-    ),
-    (
-        "growing",
-        [
-            "143f21e66139315405c3cca267434c03258bc7086828d3ae28bf84eb9520af52",
-            "4b22b64dd66be273fb39d7a86db236c61c52abdcb14a46645dd5d97c4e94c5fb",
-        ],
-    ),
-    (
-        "ball",
-        [
-            "9d7c4c99d215b81e319fcc170d576c400dba21536c858a1f673ab0a3de7abd76",
-            "669e7cfa786d9009f20d97dddc1a470af96b945bf473069ba9be397c3722cf71",
-        ],
-    ),
-    (
-        "drift",
-        [
-            "1b16a880b363bdafa5b2725e2cce014ed76ba45948823777d3debf3e9613f4db",
-            "6223f1c1084b6bcc275ed6dda7b9952334f7bf5d5cff5dc83c0f1994445b8483",
-        ],
-    ),
-    (
-        "faults",
-        [
-            "d169ed411fff45c1855bedb374dfbbab085d066c9045029dd512a397afdafe78",
-            "8c06373522556dff3a930a404157961fc0c0df48e48aef086d81bcf3bde6160c",
-        ],
-    ),
-    (
-        "contacts_1",
-        [
-            "ab62511c68525d2ede0b7e184a327438d56d3a7e03b7e1ab336e7a8a5679f632",
-            "a656967213d568555993f79e59b24253b6f73206dd6c81820878d4961a44e748",
-        ],
-    ),
-    (
-        "contacts_3",
-        [
-            "9f86607cd477809537adbd5535bf1f4ef21178334995f85f669abbb73b1cd6f5",
-            "472426bafd745859b83545f4341d6f0c45c7698aac0696b8516e4427f5263d4f",
-        ],
-    ),
-    (
-        "contacts_10",
-        [
-            "75377a2cb82d112a1d62de9a0a91134e8b6b9077c68ab4495f576591ac43e49c",
-            "38456f8ce7107c81a2fdb653ffb46ed1f76410f1aadf98d222747b0744505388",
-        ],
-    ),
-    (
-        "wires_4",
-        [
-            "9a86e15f3ddf4682707d1b348ac528a7a62c6e65852020bec849176c4f95d765",
-            "45de88f4c6250d25cf10e4846e06b997796b84f2b59c848766cf52dee0837cc6",
-        ],
-    ),
-    (
-        "size_10000",
-        [
-            "ebeeea93bd2386cad4c01a8cf7821984edd710ebc1020aa79f950ca4c4d59d59",
-            "df49de60acf55962b586e4e5777df682afa7d9486b77219769efd13200d7f035",
-        ],
-    ),
-];
+/// What the suite was released with: for every task, with `--quick` and without.
+static RELEASE: LazyLock<BTreeMap<String, [Released; 2]>> =
+    LazyLock::new(|| serde_json::from_str(include_str!("touch-1.json")).unwrap_or_default());
+
+/// What is known of the touches of a task's test split.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub(super) struct Released {
+    /// SHA-256 of the touches.
+    pub(super) sha256: String,
+    /// Score of the mean of the images to learn from.
+    pub(super) floor: f64,
+    /// Score by all there is to measure.
+    pub(super) ceiling: f64,
+}
 
 /// Skins of a task, with `--quick` and without.
 const SKINS: [usize; 2] = [2, 6];
@@ -414,9 +335,14 @@ impl Task {
         Ok(touches.collect::<Result<Vec<_>, Refusal>>()?.into_iter().flatten().collect())
     }
 
-    /// Whether touches with this digest are those that the suite was released with; other machines may compute others.
-    pub(super) fn knows(&self, sha256: &str) -> bool {
-        DIGESTS.iter().any(|(task, known)| *task == self.name && known.contains(&sha256))
+    /// Whether a touch is by one object, after which it is called.
+    pub(super) fn one_object(&self) -> bool {
+        !matches!(self.scene, Scene::Held { contacts: 2.., .. })
+    }
+
+    /// What is known of touches with this digest; other machines may compute others.
+    pub(super) fn released(&self, sha256: &str) -> Option<&'static Released> {
+        RELEASE.get(self.name)?.iter().find(|released| released.sha256 == sha256)
     }
 
     fn skin(&self, device: Streams, touches: usize) -> Result<SkinTrials, Refusal> {
@@ -436,10 +362,10 @@ impl Task {
     }
 
     fn held(&self, device: Streams, touches: usize) -> Result<Vec<Touch>, Refusal> {
-        let Scene::Held { objects, placed, families, size_m, contacts } = self.scene else { return Ok(Vec::new()) };
+        let Scene::Held { objects, place, families, size_m, contacts } = self.scene else { return Ok(Vec::new()) };
         let seed = device.rng("touches", 0).random();
         let scene = TouchScene {
-            placed,
+            place,
             families,
             contacts,
             size_m: Some(size_m).filter(|_| objects == TouchObjects::Shapes),
@@ -606,23 +532,4 @@ pub(super) fn digest(skins: &[SkinTrials]) -> String {
 /// SHA-256 of `bytes` in hexadecimal digits.
 pub(super) fn in_digits(bytes: &[u8]) -> String {
     Sha256::digest(bytes).iter().map(|byte| format!("{byte:02x}")).collect()
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    /// The touches of a release stay what they are; those of other splits are others.
-    #[test]
-    fn the_touches_are_those_of_the_release() {
-        let (mut lines, mut known) = (String::new(), true);
-        for task in TASKS {
-            let of = |split: Split, quick: bool| digest(&task.skins(split, quick).unwrap());
-            let tests = [true, false].map(|quick| of(Split::Test, quick));
-            assert_ne!(tests[0], of(Split::Public, true), "{}", task.name);
-            known &= DIGESTS.contains(&(task.name, [&*tests[0], &*tests[1]]));
-            lines.push_str(&format!("    (\"{}\", {tests:?}),\n", task.name));
-        }
-        assert!(known, "they are now\n{lines}");
-    }
 }

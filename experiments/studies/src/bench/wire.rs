@@ -144,13 +144,13 @@ impl<'a> WireSession<'a> {
     fn frame<R: CellCodes + Clone + 'static>(
         &mut self,
         key: usize,
-        rows: &R,
+        rows: impl Fn() -> R,
         all: usize,
         measured: Range<usize>,
     ) -> Result<WireFrame, Refusal> {
         self.built(key, all, |session| {
             let readout = Readout::new(&session.profile, Mode::Raster, &session.skin.layout, session.device, 0)?;
-            readout.with_codes(|_| Ok(Box::new(session.cells(rows.clone()))))
+            readout.with_codes(|_| Ok(Box::new(session.cells(rows()))))
         })?;
         self.measure(key, measured)
     }
@@ -218,13 +218,8 @@ impl<'a> WireSession<'a> {
     /// [`Refusal`] if the readout cannot be built, or more is asked for than is left.
     pub fn scan(&mut self, count: usize) -> Result<WireFrame, Refusal> {
         self.spend(count)?;
-        self.whole_scan(count)
-    }
-
-    /// A scan of the first `count` taxels, of which no measurement is taken off.
-    pub(super) fn whole_scan(&mut self, count: usize) -> Result<WireFrame, Refusal> {
         let taxels = self.skin.layout.taxels();
-        self.frame(SCAN, &OneByOne { taxels }, taxels, 0..count)
+        self.frame(SCAN, || OneByOne { taxels }, taxels, 0..count)
     }
 
     /// A frame of `measurements` rows of ±1, as sums of conductances, µS: y = Φ x. Other rows need another `key`.
@@ -238,7 +233,7 @@ impl<'a> WireSession<'a> {
         measurements: usize,
     ) -> Result<WireFrame, Refusal> {
         self.spend(measurements)?;
-        let frame = self.frame(key, rows, measurements, 0..measurements)?;
+        let frame = self.frame(key, || rows.clone(), measurements, 0..measurements)?;
         Ok(self.in_units(frame))
     }
 
@@ -281,7 +276,7 @@ impl<'a> WireSession<'a> {
         }
         // rows that are asked for once
         self.frames.remove(&ONCE);
-        let frame = self.frame(ONCE, &codes, rows.len(), 0..rows.len())?;
+        let frame = self.frame(ONCE, || codes.clone(), rows.len(), 0..rows.len())?;
         Ok(self.in_units(frame).volts)
     }
 
@@ -298,18 +293,19 @@ impl<'a> WireSession<'a> {
         frame
     }
 
-    /// Row `row` of `rows`, of which there are `all`: a sample by itself, and the alarm.
+    /// Row `row` of the rows of a `group`, of which there are `all`: a sample by itself, and the alarm of the group.
     ///
     /// # Errors
     /// As [`WireSession::signs`].
     pub(super) fn single<R: CellCodes + Clone + 'static>(
         &mut self,
-        rows: &R,
+        group: usize,
+        rows: impl Fn() -> R,
         all: usize,
         row: usize,
     ) -> Result<(f64, f64), Refusal> {
         self.spend(1)?;
-        let frame = self.frame(SINGLE, rows, all, row..row + 1)?;
+        let frame = self.frame(SINGLE + group, rows, all, row..row + 1)?;
         Ok((frame.volts.first().copied().unwrap_or(0.0), frame.alarm_v))
     }
 
@@ -369,11 +365,10 @@ impl<'a> WireSession<'a> {
     }
 }
 
-/// Keys of scans and of single rows.
+/// Keys of scans, of rows that are asked for once, and of groups of single rows.
 const SCAN: usize = usize::MAX;
-const SINGLE: usize = usize::MAX - 1;
-/// Key of rows that are asked for once.
-const ONCE: usize = usize::MAX - 2;
+const ONCE: usize = usize::MAX - 1;
+const SINGLE: usize = usize::MAX / 2;
 
 /// The signs of weights.
 #[derive(Clone)]

@@ -1,6 +1,6 @@
 //! The objects for which a skin is designed.
 
-use crate::touches::{Touch, TouchObjects, TouchScene};
+use crate::touches::{Place, Touch, TouchObjects, TouchScene};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use spts_dataset::{ObjectSource, PoseOrigin, Spec};
@@ -100,7 +100,7 @@ impl DesignObjects {
         let objects = if self.seventeen { TouchObjects::Objects } else { TouchObjects::Shapes };
         TouchScene {
             size_m: (!self.seventeen).then_some(self.size_m),
-            placed: self.placed,
+            place: if self.placed { Place::Published } else { Place::Anywhere },
             contacts: self.contacts,
             ..TouchScene::new(*layout, objects, touches, seed)
         }
