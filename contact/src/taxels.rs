@@ -50,16 +50,21 @@ impl TaxelBins {
     /// # Panics
     /// If `fine` does not have `(rows · cells) × (cols · cells)` values, or `patch` is not inside the map.
     pub fn means(&self, fine: &[f64], patch: Option<Patch>) -> [PressureMap; 2] {
-        let patch = patch.unwrap_or_else(|| self.whole());
+        let mut maps = [(); 2].map(|()| PressureMap::zeros(self.rows, self.cols));
+        self.add(fine, patch.unwrap_or_else(|| self.whole()), maps.each_mut());
+        maps
+    }
+
+    /// Adds the means of the map `fine`, which is 0 outside `patch`, to `maps`.
+    pub(crate) fn add(&self, fine: &[f64], patch: Patch, maps: [&mut PressureMap; 2]) {
         let width = self.cols * self.cells;
         assert_eq!(fine.len(), self.rows * self.cells * width, "fine field of the wrong shape");
-        let mut maps = [(); 2].map(|()| PressureMap::zeros(self.rows, self.cols));
         if patch.is_empty() {
-            return maps;
+            return;
         }
         let share = 1.0 / self.cells as f64;
         let taxels = patch.cols[0] / self.cells..patch.cols[1].div_ceil(self.cells);
-        let [cell_means, electrode_means] = &mut maps;
+        let [cell_means, electrode_means] = maps;
         for y in patch.rows[0]..patch.rows[1] {
             let line = &fine[y * width..(y + 1) * width];
             let electrode_line = self.electrode_weights[y % self.cells];
@@ -72,7 +77,13 @@ impl TaxelBins {
                 electrode_means.values_mut()[first + x] += electrode_line * sum;
             }
         }
-        maps
+    }
+
+    /// The taxels that `patch` has a part of.
+    pub(crate) fn taxels(&self, patch: Patch) -> impl Iterator<Item = usize> + use<> {
+        let along = |cells: [usize; 2]| cells[0] / self.cells..cells[1].div_ceil(self.cells);
+        let (rows, cols, width) = (along(patch.rows), along(patch.cols), self.cols);
+        rows.flat_map(move |row| cols.clone().map(move |col| row * width + col))
     }
 
     fn whole(&self) -> Patch {

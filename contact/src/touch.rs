@@ -86,6 +86,8 @@ pub struct TouchSkin {
     columns: Vec<Column>,
     pressure: PressureMap,
     electrode_pressure: PressureMap,
+    /// Taxels that may have a pressure, in their order.
+    touched: Vec<usize>,
     touched_m2: f64,
     bottomed: bool,
 }
@@ -157,6 +159,7 @@ impl TouchSkin {
         Self {
             pressure: zeros(),
             electrode_pressure: zeros(),
+            touched: Vec::new(),
             touched_m2: 0.0,
             bottomed: false,
             columns: Vec::new(),
@@ -234,6 +237,11 @@ impl TouchSkin {
         }
     }
 
+    /// The taxels that may have a pressure, in their order; all others have none.
+    pub fn touched(&self) -> &[usize] {
+        &self.touched
+    }
+
     /// Area of the skin under pressure, m².
     pub fn touched_m2(&self) -> f64 {
         self.touched_m2
@@ -250,21 +258,40 @@ impl TouchSkin {
     /// is not finite gets a wrench of NaN and presses nothing.
     pub fn touch(&mut self, bodies: &[(&TouchBody, PosedMesh<'_>)], wrenches: &mut Vec<Wrench>) {
         wrenches.clear();
+        self.clear();
         match &mut self.surface {
             Surface::Flat(flat) => {
-                self.pressure.values_mut().fill(0.0);
-                self.electrode_pressure.values_mut().fill(0.0);
                 let maps = [&mut self.pressure, &mut self.electrode_pressure];
-                (self.touched_m2, self.bottomed) = flat.touch(bodies, wrenches, maps);
+                (self.touched_m2, self.bottomed) = flat.touch(bodies, wrenches, maps, &mut self.touched);
             }
             Surface::Curved(field) => {
-                field.clear_with(self.pressure.values_mut());
                 wrenches.extend(bodies.iter().map(|(body, posed)| field.press(&body.solid, posed)));
-                field.add_means(self.pressure.values_mut());
-                self.touched_m2 = field.touched_m2();
-                self.bottomed = field.bottomed();
             }
         }
+        self.finish();
+    }
+
+    /// Removes everything from the skin.
+    fn clear(&mut self) {
+        for map in [&mut self.pressure, &mut self.electrode_pressure] {
+            self.touched.iter().for_each(|k| map.values_mut()[*k] = 0.0);
+        }
+        self.touched.clear();
+        (self.touched_m2, self.bottomed) = (0.0, false);
+        if let Surface::Curved(field) = &mut self.surface {
+            field.clear();
+        }
+    }
+
+    /// Brings what is known of the taxels up to date.
+    fn finish(&mut self) {
+        if let Surface::Curved(field) = &self.surface {
+            field.add_means(self.pressure.values_mut());
+            self.touched.extend(field.touched_taxels());
+            (self.touched_m2, self.bottomed) = (field.touched_m2(), field.bottomed());
+        }
+        self.touched.sort_unstable();
+        self.touched.dedup();
     }
 
     /// Removes everything from the skin and reads `loads`: what it feels of bodies that something else carries. The
@@ -272,14 +299,7 @@ impl TouchSkin {
     /// pressure × area is the sum of the forces to 1e-9 of it. Loads that are not positive, or not finite, are passed
     /// over.
     pub fn read(&mut self, loads: &[Carried<'_>]) {
-        (self.touched_m2, self.bottomed) = (0.0, false);
-        match &mut self.surface {
-            Surface::Curved(field) => field.clear_with(self.pressure.values_mut()),
-            Surface::Flat(_) => {
-                self.pressure.values_mut().fill(0.0);
-                self.electrode_pressure.values_mut().fill(0.0);
-            }
-        }
+        self.clear();
         for (number, load) in loads.iter().enumerate() {
             let finite = load.posed.is_finite() && load.centre_m.iter().all(|v| v.is_finite());
             if !(finite && load.normal_n > 0.0 && load.normal_n < f64::INFINITY) {
@@ -314,15 +334,12 @@ impl TouchSkin {
                     self.bottomed |= columns.iter().any(|c| c.depth_m > self.foam.thickness_m);
                     let maps = [&mut self.pressure, &mut self.electrode_pressure];
                     // two bodies in one place count twice
-                    self.touched_m2 += flat.carry(columns, &law, maps);
+                    self.touched_m2 += flat.carry(columns, &law, maps, &mut self.touched);
                 }
                 Surface::Curved(field) => field.carry(columns, &law),
             }
         }
-        if let Surface::Curved(field) = &self.surface {
-            field.add_means(self.pressure.values_mut());
-            (self.touched_m2, self.bottomed) = (field.touched_m2(), field.bottomed());
-        }
+        self.finish();
     }
 
     /// Springs that stand for the foam under a body for one step of `step_s`, with what it wears, `lining_m` thick.
@@ -388,28 +405,34 @@ impl Surface {
 }
 
 impl FlatSkin {
-    /// Adds the pressures of `columns` at their depths to `maps`. The area under pressure, m².
-    fn carry(&mut self, columns: &[Column], law: &FoamLaw, maps: [&mut PressureMap; 2]) -> f64 {
+    /// Adds the pressures of `columns` at their depths to `maps`, and their taxels to `taxels`. The area under
+    /// pressure, m².
+    fn carry(
+        &mut self,
+        columns: &[Column],
+        law: &FoamLaw,
+        maps: [&mut PressureMap; 2],
+        taxels: &mut Vec<usize>,
+    ) -> f64 {
         let mut touched = 0.0;
         for c in columns {
             let p = law.pressure_pa(c.depth_m);
             self.layer.pressure_pa[c.index] += c.share * p;
             touched += if p > 0.0 { c.share } else { 0.0 };
         }
-        for (sum, map) in maps.into_iter().zip(self.bins.means(&self.layer.pressure_pa, Some(self.layer.patch))) {
-            for (sum, p) in sum.values_mut().iter_mut().zip(map.values()) {
-                *sum += p;
-            }
-        }
+        self.bins.add(&self.layer.pressure_pa, self.layer.patch, maps);
+        taxels.extend(self.bins.taxels(self.layer.patch));
         touched * self.cell_area_m2
     }
 
-    /// Adds the pressures under `bodies` to `maps`. The area under pressure, m², and whether a body has gone through.
+    /// Adds the pressures under `bodies` to `maps`, and their taxels to `taxels`. The area under pressure, m², and
+    /// whether a body has gone through.
     fn touch(
         &mut self,
         bodies: &[(&TouchBody, PosedMesh<'_>)],
         wrenches: &mut Vec<Wrench>,
-        mut maps: [&mut PressureMap; 2],
+        [pressure, electrode_pressure]: [&mut PressureMap; 2],
+        taxels: &mut Vec<usize>,
     ) -> (f64, bool) {
         self.touches += 1;
         self.known.resize_with(bodies.len().max(self.known.len()), KnownBody::default);
@@ -421,13 +444,10 @@ impl FlatSkin {
             }
             self.layer.swap_known(known);
             self.layer.expect(&body.mesh);
-            let answer = self.layer.respond_to(posed, Some(&body.solid));
-            wrenches.push(answer.wrench);
-            for (sum, map) in maps.iter_mut().zip(self.bins.means(answer.pressure_pa, answer.patch)) {
-                for (sum, p) in sum.values_mut().iter_mut().zip(map.values()) {
-                    *sum += p;
-                }
-            }
+            wrenches.push(self.layer.respond_to(posed, Some(&body.solid)).wrench);
+            let maps = [&mut *pressure, &mut *electrode_pressure];
+            self.bins.add(&self.layer.pressure_pa, self.layer.patch, maps);
+            taxels.extend(self.bins.taxels(self.layer.patch));
             cells += self.layer.pressed_cells(|index| {
                 let last = std::mem::replace(&mut self.pressed[index], self.touches);
                 last != self.touches

@@ -3,7 +3,6 @@
 use crate::args::{Array1, Array2, PoseIn, checked_twist, one_of, triples, triples_out, whole};
 use crate::body::Body;
 use crate::common::{of_toml, refuse, to_toml};
-use numpy::ndarray::Array;
 use numpy::{AllowTypeChange, IntoPyArray as _, PyArray1, PyArray2, PyArrayLike1, PyArrayLike2, PyArrayMethods as _};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyTuple};
@@ -469,21 +468,19 @@ impl Skin {
         if !(0.0..=1e9).contains(&dt) {
             bail!("`dt` = {dt} is outside [0, 1e9] s");
         }
-        let (wrenches, values, felt, [area, time], (number, bottomed)) = py.detach(|| {
+        let (wrenches, felt, [area, time], (number, bottomed)) = py.detach(|| {
             let mut state = self.locked();
             let wrenches = act(&mut state.skin);
             state.touches += 1;
             state.time_s += dt;
-            let values = state.skin.pressure().values().to_vec();
-            let felt = state.skin.electrode_pressure().clone();
+            let [means, electrodes] = [state.skin.pressure(), state.skin.electrode_pressure()];
+            let of = |k: &usize| (*k, [means.values()[*k], electrodes.values()[*k]]);
+            let felt = Felt { shape: [means.rows(), means.cols()], pa: state.skin.touched().iter().map(of).collect() };
             let scalars = [state.skin.touched_m2(), state.time_s];
-            (wrenches, values, felt, scalars, (state.touches, state.skin.bottomed()))
+            (wrenches, felt, scalars, (state.touches, state.skin.bottomed()))
         });
         Ok(Touch {
-            pressure: Array::from_shape_vec([felt.rows(), felt.cols()], values)
-                .map_err(refuse)?
-                .into_pyarray(py)
-                .unbind(),
+            pressure: OnceLock::new(),
             wrenches: OnceLock::new(),
             loads: Arc::new((bodies.clone(), wrenches)),
             area,
@@ -504,7 +501,7 @@ impl Skin {
         state.touches += 1;
         state.time_s += dt;
         Some(Touch {
-            pressure: last.pressure.clone_ref(py),
+            pressure: last.pressure.get().map_or_else(OnceLock::new, |known| known.clone_ref(py).into()),
             wrenches: OnceLock::new(),
             loads: last.loads.clone(),
             time: state.time_s,
@@ -549,9 +546,8 @@ type Loads = (Arc<[Py<Body>]>, Vec<(usize, Wrench)>);
 /// What the skin feels at one moment.
 #[pyclass(frozen, module = "spts")]
 pub(crate) struct Touch {
-    /// Mean pressure over every taxel, Pa, (rows, cols).
-    #[pyo3(get)]
-    pressure: Py<PyArray2<f64>>,
+    /// The pressures as an array, once somebody has asked for it.
+    pressure: OnceLock<Py<PyArray2<f64>>>,
     /// The wrenches, once somebody has asked for them.
     wrenches: OnceLock<Py<PyDict>>,
     loads: Arc<Loads>,
@@ -567,27 +563,51 @@ pub(crate) struct Touch {
     /// Whether a body has gone through the foam, down to the link: the pressure there is no measured one.
     #[pyo3(get)]
     bottomed: bool,
-    /// What the transducer feels.
-    pub(crate) felt: Arc<PressureMap>,
+    pub(crate) felt: Arc<Felt>,
     /// Which skin.
     pub(crate) skin: u64,
 }
 
+/// The pressures of a skin.
+#[derive(Debug, PartialEq)]
+pub(crate) struct Felt {
+    /// Rows and columns.
+    shape: [usize; 2],
+    /// Taxels that may have a pressure, in their order: number, and mean pressure over its area and its electrode, Pa.
+    pa: Vec<(usize, [f64; 2])>,
+}
+
+impl Felt {
+    /// Pressures over areas and electrodes, row by row.
+    fn of(shape: [usize; 2], means: &[f64], electrodes: &[f64]) -> Self {
+        let all = means.iter().zip(electrodes).map(|(p, electrode)| [*p, *electrode]).enumerate();
+        Self { shape, pa: all.filter(|(_, pa)| pa.iter().any(|p| *p != 0.0)).collect() }
+    }
+
+    /// Mean pressures over the areas of all taxels.
+    fn means(&self) -> Vec<f64> {
+        self.all(0)
+    }
+
+    /// Mean pressures over the electrodes of all taxels: what the transducer feels.
+    pub(crate) fn electrodes(&self) -> Vec<f64> {
+        self.all(1)
+    }
+
+    fn all(&self, which: usize) -> Vec<f64> {
+        let mut all = vec![0.0; self.shape[0] * self.shape[1]];
+        self.pa.iter().for_each(|(k, pa)| all[*k] = pa[which]);
+        all
+    }
+}
+
 impl Touch {
     /// The touch number `number` of a skin with taxels of `cell_m2`, under this pressure at the time `time`.
-    pub(crate) fn of_pressure(
-        py: Python<'_>,
-        pressure: PressureMap,
-        cell_m2: f64,
-        [time, number]: [f64; 2],
-        skin: u64,
-    ) -> PyResult<Self> {
+    pub(crate) fn of_pressure(pressure: &PressureMap, cell_m2: f64, [time, number]: [f64; 2], skin: u64) -> Self {
         let pressed = pressure.values().iter().filter(|p| **p > 0.0).count();
-        Ok(Self {
-            pressure: Array::from_shape_vec([pressure.rows(), pressure.cols()], pressure.values().to_vec())
-                .map_err(refuse)?
-                .into_pyarray(py)
-                .unbind(),
+        let shape = [pressure.rows(), pressure.cols()];
+        Self {
+            pressure: OnceLock::new(),
             wrenches: OnceLock::new(),
             loads: Arc::new((Arc::from([]), Vec::new())),
             area: pressed as f64 * cell_m2,
@@ -595,9 +615,9 @@ impl Touch {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number of touches")]
             number: number as u64,
             bottomed: false,
-            felt: Arc::new(pressure),
+            felt: Arc::new(Felt::of(shape, pressure.values(), pressure.values())),
             skin,
-        })
+        }
     }
 }
 
@@ -634,7 +654,7 @@ impl Touch {
     ///     Time since the touch before, s, [0, 1e9].
     #[staticmethod]
     #[pyo3(signature = (skin, pressure, dt = 0.1))]
-    fn from_array(py: Python<'_>, skin: &Skin, pressure: &Bound<'_, PyAny>, dt: f64) -> PyResult<Self> {
+    fn from_array(skin: &Skin, pressure: &Bound<'_, PyAny>, dt: f64) -> PyResult<Self> {
         if !(0.0..=1e9).contains(&dt) {
             bail!("`dt` = {dt} is outside [0, 1e9] s");
         }
@@ -643,7 +663,17 @@ impl Touch {
         let pressure = pressure_of("pressure", pressure, [layout.rows(), layout.cols()])?;
         state.touches += 1;
         state.time_s += dt;
-        Self::of_pressure(py, pressure, layout.cell_area_m2(), [state.time_s, state.touches as f64], skin.id)
+        Ok(Self::of_pressure(&pressure, layout.cell_area_m2(), [state.time_s, state.touches as f64], skin.id))
+    }
+
+    /// Mean pressure over every taxel, Pa, (rows, cols).
+    #[getter]
+    fn pressure<'py>(&self, py: Python<'py>) -> PyResult<Array2<'py>> {
+        if let Some(known) = self.pressure.get() {
+            return Ok(known.bind(py).clone());
+        }
+        let found = self.felt.means().into_pyarray(py).reshape(self.felt.shape)?;
+        Ok(self.pressure.get_or_init(|| found.unbind()).bind(py).clone())
     }
 
     /// Wrench on every body about its origin, in the skin's frame: (force (3,) N, torque (3,) N m).
@@ -663,9 +693,9 @@ impl Touch {
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
         let (py, touch) = (slf.py(), slf.get());
-        let felt = PyArray1::from_slice(py, touch.felt.values());
+        let felt = touch.felt.electrodes().into_pyarray(py);
         let scalars = (touch.area, touch.time, touch.number, touch.bottomed, touch.skin);
-        let arguments = (touch.pressure.bind(py), touch.wrenches(py)?, felt, scalars).into_pyobject(py)?;
+        let arguments = (touch.pressure(py)?, touch.wrenches(py)?, felt, scalars).into_pyobject(py)?;
         Ok((slf.get_type().getattr("_restored")?, arguments))
     }
 
@@ -682,8 +712,9 @@ impl Touch {
         if felt.len() != rows * cols {
             bail!("a touch of {rows} x {cols} taxels with {} pressures", felt.len());
         }
-        let felt = Arc::new(PressureMap::from_values(rows, cols, felt));
-        let (pressure, wrenches, loads) = (pressure.unbind(), wrenches.unbind().into(), Default::default());
+        let means: Vec<f64> = pressure.readonly().as_array().iter().copied().collect();
+        let felt = Arc::new(Felt::of([rows, cols], &means, &felt));
+        let (pressure, wrenches, loads) = (pressure.unbind().into(), wrenches.unbind().into(), Default::default());
         Ok(Self { pressure, wrenches, loads, area, time, number, bottomed, felt, skin })
     }
 }

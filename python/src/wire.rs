@@ -432,7 +432,7 @@ impl Wire {
             let last = &state.skins[skin];
             [last.time_s + dt.unwrap_or(HELD_S), last.number as f64 + 1.0]
         };
-        let made = Touch::of_pressure(touch.py(), pressure, part.layout.cell_area_m2(), now, part.id.cast_unsigned())?;
+        let made = Touch::of_pressure(&pressure, part.layout.cell_area_m2(), now, part.id.cast_unsigned());
         Py::new(touch.py(), made)
     }
 
@@ -458,10 +458,10 @@ impl Wire {
                     last.time_s
                 );
             }
-            let felt = touch.felt.values();
+            let felt = touch.felt.electrodes();
             let felt = match &part.taxels {
                 Some(taxels) => taxels.iter().map(|taxel| felt[*taxel]).collect(),
-                None => felt.to_vec(),
+                None => felt,
             };
             let pressure = PressureMap::from_values(part.layout.rows(), part.layout.cols(), felt);
             if touch.number > last.number {

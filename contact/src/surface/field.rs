@@ -224,10 +224,9 @@ impl SurfaceField {
         self.bottomed = false;
     }
 
-    /// As [`SurfaceField::clear`], with the taxels of `means` that [`SurfaceField::add_means`] has written.
-    pub(crate) fn clear_with(&mut self, means: &mut [f64]) {
-        self.touched.iter().for_each(|k| means[self.points.taxels[*k] as usize] = 0.0);
-        self.clear();
+    /// The taxels of the points under pressure, those of several points several times.
+    pub(crate) fn touched_taxels(&self) -> impl Iterator<Item = usize> + '_ {
+        self.touched.iter().map(|k| self.points.taxels[*k] as usize)
     }
 
     /// Adds the mean pressure over every taxel's area to `means`.
