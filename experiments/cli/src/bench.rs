@@ -1,6 +1,6 @@
 //! `spts bench`: the benchmark of few-wire touch.
 
-use crate::context::{Bars, Common, open_folder, spinner};
+use crate::context::{Bars, Common, note, open_folder, spinner};
 use crate::error::CliError;
 use crate::options::seed;
 use crate::score::read_board;
@@ -207,6 +207,9 @@ struct RunCommand {
     /// Tasks [default: all]
     #[arg(long, value_delimiter = ',', value_name = "TASK,…", value_parser = known_task())]
     tasks: Vec<&'static Task>,
+    /// Tasks that it cannot do, for which there are no points [default: none]
+    #[arg(long, value_delimiter = ',', value_name = "TASK,…", value_parser = known_task())]
+    skip: Vec<&'static Task>,
     /// Few touches, a minute
     #[arg(long)]
     quick: bool,
@@ -236,7 +239,7 @@ fn choice(who: &str, track: Option<Track>) -> Result<Choice, Refusal> {
         Err(_) if who.ends_with(".py") && !who.contains([' ', '=']) && !Path::new(who).is_file() => {
             Err(Refusal::new("no such file").at(who))
         }
-        Err(_) if program => Ok(Choice::program(who, track)),
+        Err(_) if program => Choice::program(who, track),
         other => other,
     }
 }
@@ -252,12 +255,16 @@ impl RunCommand {
         }
         let bench = Bench::new(choice(&self.who, self.track.map(Track::from))?);
         let tasks = if self.tasks.is_empty() { bench.tasks.clone() } else { unique(self.tasks) };
+        if let Some(task) = tasks.iter().find(|task| !bench.tasks.contains(task)) {
+            let problem = format!("`--tasks`: {} is not for the track {}", task.name, bench.choice.track.name());
+            return Err(Refusal::new(problem).into());
+        }
         let split = match (self.public, self.seed) {
             (true, _) => Split::Public,
             (false, Some(seed)) => Split::Fresh(seed),
             (false, None) => Split::Test,
         };
-        let card = Bench { tasks, split, quick: self.quick, ..bench }.run(&Bars::default())?;
+        let card = Bench { tasks, split, quick: self.quick, skipped: self.skip, ..bench }.run(&Bars::default())?;
         if let Some(file) = &self.save {
             write_json(file, &card)?;
         }
@@ -267,13 +274,14 @@ impl RunCommand {
 
 fn read(file: &Path) -> Result<Card, Refusal> {
     let text = spts_input::read_text(file, MOST_BYTES).map_err(|e| Refusal::from_error(e).at(file.display()))?;
-    parse_json(file, &text)
+    parse_json(file, &text).map_err(|e| Refusal::new(format!("{e}; `spts bench run --save` writes cards")))
 }
 
 /// Largest card, bytes.
 const MOST_BYTES: u64 = 10_000_000;
 
-/// Runs the entrant of a card again and compares.
+/// Runs the entrant of a card again and compares. A card of a program has its command, which is run in this folder:
+/// look at it before if the card is not yours. The status is 1 if the cards differ.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts bench verify cards/amortised.json
@@ -301,7 +309,10 @@ impl VerifyCommand {
         self.common.start()?;
         let card = read(&self.card)?;
         let who = match &card.command {
-            Some(command) => choice(command, Some(card.track))?,
+            Some(command) => {
+                note(&format!("runs the card's `command`: {command}"));
+                choice(command, Some(card.track)).map_err(|e| e.at("`command`").at(self.card.display()))?
+            }
             None => Choice::named(&card.entrant, Some(card.track))?,
         };
         let tasks = card.tasks.iter().map(|task| {
@@ -315,7 +326,9 @@ impl VerifyCommand {
                 split.strip_prefix("fresh ").and_then(|n| n.parse().ok()).map_or(Split::Test, Split::Fresh)
             }
         };
-        let again = Bench { choice: who, tasks, split, quick: card.quick }.run(&Bars::default())?;
+        let skipped = card.tasks.iter().filter(|task| task.is_skipped()).filter_map(|task| task_named(&task.task));
+        let (quick, skipped) = (card.quick, skipped.collect());
+        let again = Bench { choice: who, tasks, split, quick, skipped }.run(&Bars::default())?;
         if self.seed.is_none() {
             card.same(&again).map_err(|e| CliError::Differs(e.at(self.card.display()).to_string()))?;
         } else if again.points.high < card.points.low {
@@ -391,15 +404,16 @@ impl TableCommand {
                 files.push(path.clone());
             }
         }
-        let cards = files.iter().map(|file| read(file)).collect::<Result<Vec<Card>, Refusal>>()?;
+        let checked = |file: &PathBuf| {
+            let card = read(file)?;
+            card.check().map_err(|e| e.at(file.display())).map(|()| card)
+        };
+        let cards = unique(files.iter()).into_iter().map(checked).collect::<Result<Vec<Card>, Refusal>>()?;
         let like = |card: &Card| (card.suite.clone(), card.split.clone(), card.quick);
         if let Some((file, other)) = files.iter().zip(&cards).find(|(_, card)| like(card) != like(&cards[0])) {
-            let (suite, split, quick) = like(other);
-            let problem = format!(
-                "`suite`, `split`, `quick` = {suite}, {split}, {quick}; valid: those of {}, {:?}",
-                files[0].display(),
-                like(&cards[0])
-            );
+            let said = |card: &Card| format!("{} of {}, quick {}", card.split, card.suite, card.quick);
+            let problem =
+                format!("a card of the split {}; valid: as {}, {}", said(other), files[0].display(), said(&cards[0]));
             return Err(Refusal::new(problem).at(file.display()).into());
         }
         let board = self.real.as_deref().map(read_board).transpose()?;

@@ -74,6 +74,7 @@ pub(super) fn train(data: &TrainingData) -> Result<Box<dyn Trained>, Refusal> {
 
 /// A mixture of clusters of procedural shapes: images alone, weighted by the evidence given y.
 pub(super) fn mixture(data: &TrainingData) -> Result<Box<dyn Trained>, Refusal> {
+    data.check_learned()?;
     data.fits_squares("covariances", SQUARES)?;
     let clusters = Clusters::with_wide(&SHAPES, data.alike(), APART, &mut ChaCha8Rng::seed_from_u64(SEED));
     let clusters = clusters.map_err(|e| e.at("templates"))?;

@@ -1,8 +1,10 @@
 //! What an entrant has got: the card that it leaves, and how two cards compare.
 
-use super::{Subject, Track};
+use super::run::SKIPPED;
+use super::{SUITE, Subject, Task, Track};
 use serde::{Deserialize, Serialize};
 use spts_input::Refusal;
+use spts_recon::statistics::mean;
 
 /// A mean with its 95 % interval over skins and touches.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -13,6 +15,14 @@ pub struct Interval {
     pub low: f64,
     /// 97.5th percentile.
     pub high: f64,
+}
+
+impl Interval {
+    /// Whether it is one, in [0, `most`].
+    fn is_within(&self, most: f64) -> bool {
+        let Self { mean, low, high } = *self;
+        0.0 <= low && low <= mean + ROUNDED && mean <= high + ROUNDED && high <= most + ROUNDED
+    }
 }
 
 /// The interval of `drawn` about `mean`.
@@ -59,6 +69,19 @@ pub struct TaskCard {
     pub refused: Option<String>,
 }
 
+impl TaskCard {
+    /// Points of scores, one for every number of measurements.
+    pub(super) fn points_of(&self, scores: impl Iterator<Item = f64>) -> f64 {
+        let range = (self.ceiling - self.floor).max(f64::MIN_POSITIVE);
+        mean(scores.map(|score| 100.0 * ((score - self.floor) / range).clamp(0.0, 1.0))).unwrap_or(0.0)
+    }
+
+    /// Whether it was left out by the one who ran the entrant.
+    pub fn is_skipped(&self) -> bool {
+        self.refused.as_deref() == Some(SKIPPED)
+    }
+}
+
 /// What an entrant has got on a suite.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
 pub struct Card {
@@ -92,7 +115,48 @@ pub struct Card {
     pub machine: [String; 3],
 }
 
+/// Points agree within this.
+const ROUNDED: f64 = 1e-6;
+
 impl Card {
+    /// Whether what it says agrees with itself; only running the entrant again tells more ([`Card::same`]).
+    ///
+    /// # Errors
+    /// [`Refusal`] that names what does not.
+    pub fn check(&self) -> Result<(), Refusal> {
+        let wrong = |what: String, valid: &str| Err(Refusal::new(format!("{what}; valid: {valid}")));
+        if self.suite != SUITE {
+            return wrong(format!("`suite` = {:?}", self.suite), SUITE);
+        }
+        let number = |text: &str| text.strip_prefix("fresh ").is_some_and(|seed| seed.parse::<u64>().is_ok());
+        if !(["test", "public"].contains(&&*self.split) || number(&self.split)) {
+            return wrong(format!("`split` = {:?}", self.split), "test, public, or fresh and a seed");
+        }
+        let of_track = Task::of(self.track);
+        for (k, task) in self.tasks.iter().enumerate() {
+            let (name, at) = (&task.task, format!("`tasks[{k}]`"));
+            if !of_track.iter().any(|known| known.name == name) || self.tasks[..k].iter().any(|t| t.task == *name) {
+                return wrong(format!("{at}: `task` = {name:?}"), "tasks of the suite and the track, each once");
+            }
+            if task.entries.is_empty() != task.refused.is_some() {
+                return wrong(format!("{at} {name}: `entries`"), "scores, or why it was not done");
+            }
+            let shares = task.entries.iter().map(|entry| &entry.score).all(|score| score.is_within(1.0));
+            let points = task.points_of(task.entries.iter().map(|entry| entry.score.mean));
+            if !(shares && task.points.is_within(100.0) && (points - task.points.mean).abs() <= ROUNDED) {
+                return wrong(format!("{at} {name}: `points` = {}", task.points.mean), "those of its scores");
+            }
+        }
+        let points = mean(self.tasks.iter().map(|task| task.points.mean)).unwrap_or(f64::NAN);
+        if !(self.points.is_within(100.0) && (points - self.points.mean).abs() <= ROUNDED) {
+            return wrong(format!("`points` = {}", self.points.mean), "the mean of the tasks'");
+        }
+        if self.official && (self.split != "test" || self.quick || self.tasks.len() < of_track.len()) {
+            return wrong("`official` = true".to_owned(), "all tasks on the whole test split");
+        }
+        Ok(())
+    }
+
     /// The first difference from `again`, which was made by the same entrant, in what does not depend on the machine.
     ///
     /// # Errors
@@ -125,6 +189,9 @@ impl Card {
             let at = |what: &str| format!("{}.{what}", a.task);
             if a.data_sha256 != b.data_sha256 {
                 return differs(&at("data_sha256"), &a.data_sha256, &b.data_sha256);
+            }
+            if a.entries.len() != b.entries.len() {
+                return differs(&at("entries"), &a.entries.len(), &b.entries.len());
             }
             for (mine, other) in a.entries.iter().zip(&b.entries) {
                 if mine != other {

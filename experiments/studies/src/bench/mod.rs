@@ -231,18 +231,33 @@ impl Choice {
         let on = |of: Track| track.is_none_or(|track| track == of);
         let found = Track::ALL.into_iter().filter(|of| on(*of)).find_map(|of| Some((of, Self::on(of, name)?)));
         let (track, kind) = found.ok_or_else(|| {
+            if let Some(other) = Track::ALL.into_iter().find(|of| Self::on(*of, name).is_some()) {
+                return Refusal::new(format!("{name:?} is of the track {}", other.name()));
+            }
             let names: Vec<String> = Track::ALL.into_iter().filter(|of| on(*of)).flat_map(Self::names).collect();
-            Refusal::new(format!("no entrant is called {name:?}; valid: {}", names.join(", ")))
+            Refusal::new(format!(
+                "{name:?} is no file, no program and no entrant by name; valid names: {}",
+                names.join(", ")
+            ))
         })?;
         Ok(Self { name: name.to_owned(), track, kind, command: None })
     }
 
     /// A program on `track`, as `--external` of `spts score` takes it; or the class in a Python file, which is on the
-    /// track of the methods that it has: `predict`, `rows` too, or `read`.
-    pub fn program(text: &str, track: Option<Track>) -> Self {
+    /// track of the methods that it has: `read`, or `rows` beside `predict`, or `predict` alone.
+    ///
+    /// # Errors
+    /// [`Refusal`] for no command, the name of another entrant, and a Python file without the methods of the track.
+    pub fn program(text: &str, track: Option<Track>) -> Result<Self, Refusal> {
         let command = ExternalCommand { limit: DEADLINE, first: LEARNING, ..ExternalCommand::parse(text) };
-        let class = class_of(&command.command).unwrap_or_default();
-        let has = |method: &str| class.contains(&format!("def {method}("));
+        if command.command.trim().is_empty() {
+            return Err(Refusal::new(format!("`{text}` has no command")));
+        }
+        if Track::ALL.into_iter().any(|of| Self::on(of, &command.name).is_some()) {
+            return Err(Refusal::new(format!("`{}` is an entrant by name; valid: another name", command.name)));
+        }
+        let class = class_of(&command.command);
+        let has = |method: &str| class.as_ref().is_some_and(|class| class.contains(&format!("def {method}(")));
         let own = if has("read") {
             Track::Readout
         } else if has("rows") {
@@ -251,7 +266,18 @@ impl Choice {
             Track::Decoder
         };
         let (name, track, said) = (command.name.clone(), track.unwrap_or(own), Some(text.to_owned()));
-        Self { name, track, kind: Kind::Program(command), command: said }
+        let needed = match track {
+            Track::Decoder => &["predict"][..],
+            Track::Rows => &["rows", "predict"],
+            Track::Readout => &["read"],
+        };
+        let file = Path::new(&command.command);
+        let python = file.extension().is_some_and(|e| e == "py") && file.is_file();
+        if let Some(method) = needed.iter().find(|method| python && !has(method)) {
+            let problem = format!("no class with a method `{method}`, which the track {} needs", track.name());
+            return Err(Refusal::new(problem).at(&command.command));
+        }
+        Ok(Self { name, track, kind: Kind::Program(command), command: said })
     }
 
     /// Whether it is a program.

@@ -33,7 +33,12 @@ pub struct Bench {
     pub split: Split,
     /// Whether few touches are scored.
     pub quick: bool,
+    /// Those of the tasks that are left out: no points.
+    pub skipped: Vec<&'static Task>,
 }
+
+/// Why a task that is left out has no points.
+pub(super) const SKIPPED: &str = "left out by --skip";
 
 /// Touches of the public split with their samples, for the development of decoders.
 pub struct Development {
@@ -97,7 +102,7 @@ struct Scored {
 impl Bench {
     /// All tasks, the test split.
     pub fn new(choice: Choice) -> Self {
-        Self { tasks: Task::of(choice.track), choice, split: Split::Test, quick: false }
+        Self { tasks: Task::of(choice.track), choice, split: Split::Test, quick: false, skipped: Vec::new() }
     }
 
     /// Scores the entrant. All values but the times are the same for any number of threads.
@@ -142,6 +147,7 @@ impl Bench {
     fn task(&self, task: &Task) -> Result<Scored, Refusal> {
         let layout = task.layout()?;
         let skins = task.skins(self.split, self.quick)?;
+        let left_out = self.skipped.contains(&task);
         let training = task.training()?;
         let mut measurements = task.measurements.to_vec();
         if self.choice.track == Track::Readout {
@@ -170,7 +176,12 @@ impl Bench {
             worst: None,
             refused: None,
         };
-        let entrant = match self.choice.build(&prepared) {
+        let built = if left_out { Err(Refusal::new(SKIPPED)) } else { self.choice.build(&prepared) };
+        let entrant = match built {
+            Err(_) if left_out => {
+                card.refused = Some(SKIPPED.to_owned());
+                return Ok(Scored { card, values: Vec::new(), times_s: Vec::new() });
+            }
             Ok(entrant) => entrant,
             Err(refusal) if self.choice.is_program() => return Err(refusal),
             Err(refusal) => {
@@ -358,8 +369,7 @@ fn worst(skins: &[SkinTrials], values: &[Vec<Vec<f64>>]) -> Option<(String, f64)
 /// Points of the task of `card` with these values.
 fn points(card: &TaskCard, values: &[Vec<&Vec<f64>>]) -> f64 {
     let entries = values.iter().flatten().map(|touch| touch.len()).next().unwrap_or(0);
-    let range = (card.ceiling - card.floor).max(f64::MIN_POSITIVE);
-    mean((0..entries).map(|k| 100.0 * ((score(values, k) - card.floor) / range).clamp(0.0, 1.0))).unwrap_or(0.0)
+    card.points_of((0..entries).map(|k| score(values, k)))
 }
 
 /// Draws skins, and of each its touches, with replacement.
