@@ -463,6 +463,7 @@ impl FlatSkin {
 mod tests {
     use super::*;
     use crate::mesh::{cuboid, sphere};
+    use crate::surface::Primitive;
 
     fn body(mesh: crate::mesh::TriMesh) -> TouchBody {
         TouchBody::from(PreparedMesh::from(mesh))
@@ -492,6 +493,66 @@ mod tests {
             assert_eq!(used.electrode_pressure(), other.electrode_pressure(), "step {k}");
             assert_eq!(used.touched_m2().to_bits(), other.touched_m2().to_bits(), "step {k}");
         }
+    }
+
+    /// Where closed forms are said to end below a flat skin, in random poses, is on their surface by its own equation:
+    /// of an ellipsoid Σ (x/a)² = 1, of a capsule the radius from its axis. A ball presses as its mesh does.
+    #[test]
+    fn closed_forms_end_on_their_surface() {
+        use rand::RngExt as _;
+        use spts_models::Streams;
+        let mut layer = WinklerLayer::new(Foam::default(), &SkinLayout::default()).unwrap();
+        let (mesh, mut rng, mut columns) = (sphere(20e-3, 64, 128), Streams::new(3).rng("poses", 0), Vec::new());
+        let mut found = 0;
+        for number in 0..400 {
+            let [a, b, c, capsule_m, half_m] = [(); 5].map(|()| rng.random_range(12e-3..40e-3));
+            let shape = if number % 2 == 0 {
+                Primitive::Ellipsoid([a, b, c])
+            } else {
+                Primitive::Capsule(capsule_m, half_m)
+            };
+            let [u, v, w]: [f64; 3] = [(); 3].map(|()| rng.random_range(-3.0..3.0));
+            let ((su, cu), (sv, cv), (sw, cw)) = (u.sin_cos(), v.sin_cos(), w.sin_cos());
+            let rotation = [
+                [cu * cv, cu * sv * sw - su * cw, cu * sv * cw + su * sw],
+                [su * cv, su * sv * sw + cu * cw, su * sv * cw - cu * sw],
+                [-sv, cv * sw, cv * cw],
+            ];
+            let solid = Solid::of_parts(vec![Part { shape, rotation, position_m: [0.0; 3] }]);
+            let [x, y] = [(); 2].map(|()| rng.random_range(-50e-3..50e-3));
+            let pose = PosedMesh::at_rest(&mesh, [x, y, rng.random_range(5e-3..25e-3)]);
+            layer.columns_under(&pose, &solid, 1e-3, &mut columns);
+            found += columns.len();
+            for c in columns.iter().filter(|c| c.depth_m < Foam::default().thickness_m) {
+                let at = c.point_m - Vector::Z * c.depth_m - Vector::from(pose.position_m);
+                let own = [0, 1, 2].map(|j| (0..3).map(|i| rotation[i][j] * at[i]).sum::<f64>());
+                let off = match shape {
+                    Primitive::Ellipsoid(half) => (0..3).map(|k| (own[k] / half[k]).powi(2)).sum::<f64>() - 1.0,
+                    _ => {
+                        let along = own[2] - own[2].clamp(-half_m, half_m);
+                        (own[0] * own[0] + own[1] * own[1] + along * along).sqrt() / capsule_m - 1.0
+                    }
+                };
+                // where the vertical line grazes the surface, the depth feels the root of the round-off
+                assert!(off.abs() < 1e-7, "{shape:?}: {off}");
+            }
+        }
+        assert!(found > 10_000, "{found}");
+        let mut skin = TouchSkin::flat(SkinLayout::default(), Foam::default()).unwrap();
+        let part = Part {
+            shape: Primitive::Ellipsoid([20e-3; 3]),
+            rotation: PosedMesh::at_rest(&mesh, [0.0; 3]).rotation,
+            // the mesh stands on its origin
+            position_m: [0.0, 0.0, 20e-3],
+        };
+        let both = [TouchBody::of_parts(PreparedMesh::from(mesh.clone()), vec![part]), body(mesh)];
+        let forces = [&both[0], &both[1]].map(|body| {
+            let mut wrenches = Vec::new();
+            skin.touch(&[(body, PosedMesh::at_rest(&body.mesh, [3e-3, -20e-3, -1.5e-3]))], &mut wrenches);
+            wrenches[0].force_n[2]
+        });
+        // the faces are inside the ball by 24 µm of 1.5 mm at most
+        assert!(forces[0] > forces[1] && forces[0] < 1.05 * forces[1], "{forces:?}");
     }
 
     /// A block in one place twice presses twice as hard on the same area; beside itself, as hard on twice the area.

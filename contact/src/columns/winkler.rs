@@ -108,7 +108,8 @@ impl WinklerLayer {
         // lower by the gap, so that the map of what is below the surface has it
         let mut lower = *body;
         lower.position_m[2] -= gap_m;
-        self.patch = self.envelope.rasterise(&lower);
+        let sampled = self.envelope.sample(&solid.standing(&lower));
+        self.patch = sampled.unwrap_or_else(|| self.envelope.rasterise(&lower));
         let standing = solid.standing(body);
         let front = |[x_m, y_m]: [f64; 2]| standing.front_m(Vector::new(x_m, y_m, -h), Vector::Z, h, gap_m);
         self.envelope.deeper_than(h + gap_m, |place| front(place).map_or(0.0, |depth_m| depth_m + gap_m));
@@ -167,10 +168,12 @@ impl WinklerLayer {
     /// Presses `body` into the cleared layer.
     fn press(&mut self, body: &PosedMesh<'_>, solid: Option<&Solid>) -> Wrench {
         let [_, width] = self.envelope.shape();
-        self.patch = self.envelope.rasterise(body);
+        let standing = solid.map(|solid| solid.standing(body));
+        let sampled = standing.as_ref().and_then(|standing| self.envelope.sample(standing));
+        self.patch = sampled.unwrap_or_else(|| self.envelope.rasterise(body));
         let c = &self.config;
-        if let Some(solid) = solid {
-            let (standing, h) = (solid.standing(body), c.thickness_m);
+        if let Some(standing) = standing {
+            let h = c.thickness_m;
             let at = |[x_m, y_m]: [f64; 2]| standing.depth_m(Vector::new(x_m, y_m, -h), Vector::Z, h);
             self.bottomed = self.envelope.deeper_than(h, at);
         }

@@ -3,6 +3,7 @@
 use crate::field::{Patch, PosedMesh};
 use crate::mesh::TriMesh;
 use crate::prepared::{BLOCK, Block, PreparedMesh};
+use crate::surface::Standing;
 use parts::Parts;
 pub(crate) use parts::{Part, split_cell};
 use raster::{Cells, Raster, least};
@@ -100,11 +101,7 @@ impl Envelope {
     /// previous call are cleared. Allocates only for another mesh than the last one and for a map larger than any
     /// before.
     pub(crate) fn rasterise(&mut self, body: &PosedMesh<'_>) -> Patch {
-        for line in self.touched.lines(self.raster.cols) {
-            self.depth_m[line].fill(0.0);
-        }
-        self.touched = Patch::default();
-        self.parts.clear();
+        self.clear();
         self.take(body);
         let (level_m, stand) = (-body.position_m[2], stand(body));
         let again = self.known.stand == stand;
@@ -126,6 +123,47 @@ impl Envelope {
             self.add_below(body, level_m);
         }
         self.touched
+    }
+
+    /// As [`Envelope::rasterise`] for a body of closed forms, exact at the centres of cells. `None`, and nothing is
+    /// done, if a part is none that is smooth over a cell.
+    pub(crate) fn sample(&mut self, body: &Standing<'_>) -> Option<Patch> {
+        let raster = &self.raster;
+        if !body.is_smooth(raster.cell_m) {
+            return None;
+        }
+        self.clear();
+        self.known.stand = Stand::default();
+        for part in body.parts() {
+            let [low, high] = part.below_m();
+            let [[left, bottom], [right, top]] = [low, high].map(|at| self.raster.cells(at));
+            let Some(patch) = self.raster.span([[left, bottom, 0.0], [right, top, 0.0], [left, top, 0.0]]) else {
+                continue;
+            };
+            for (row, line) in (patch.rows[0]..).zip(patch.lines(self.raster.cols)) {
+                let mut cols = [usize::MAX, 0];
+                for (col, depth_m) in (patch.cols[0]..).zip(&mut self.depth_m[line]) {
+                    let own_m = -part.lowest_m(self.raster.centre_m(row, col));
+                    if own_m > 0.0 {
+                        *depth_m = depth_m.max(own_m);
+                        cols = [cols[0].min(col), col + 1];
+                    }
+                }
+                if cols[0] < cols[1] {
+                    self.touched.include(Patch { rows: [row, row + 1], cols });
+                }
+            }
+        }
+        Some(self.touched)
+    }
+
+    /// Clears the depths of the last body.
+    fn clear(&mut self) {
+        for line in self.touched.lines(self.raster.cols) {
+            self.depth_m[line].fill(0.0);
+        }
+        self.touched = Patch::default();
+        self.parts.clear();
     }
 
     /// Cells with parts have the depth of the deepest.

@@ -8,4 +8,5 @@ mod tests;
 
 pub use field::SurfaceField;
 pub use points::{SurfacePoints, Winding};
+pub(crate) use solid::Standing;
 pub use solid::{Part, Primitive, Solid};

@@ -200,14 +200,62 @@ pub(crate) struct Standing<'a> {
     solid: &'a Solid,
     axes: [Vector; 3],
     origin_m: Vector,
-    /// Its parts where they are; of each the columns of its rotation's inverse, its origin, and half the sides of the
-    /// box around it.
-    parts: Vec<(Primitive, [Vector; 3], Vector, Vector)>,
+    /// Its parts where they are.
+    parts: Vec<StandingPart>,
+}
+
+/// A part where it is.
+#[derive(Debug)]
+pub(crate) struct StandingPart {
+    shape: Primitive,
+    /// Columns of its rotation's inverse.
+    axes: [Vector; 3],
+    origin_m: Vector,
+    /// Half the sides of the box around it.
+    half_m: Vector,
+}
+
+impl StandingPart {
+    /// Height of its lowest point on the vertical line through a place (x, y), m; infinite beside it.
+    #[inline]
+    pub(crate) fn lowest_m(&self, [x, y]: [f64; 2]) -> f64 {
+        let start = into(&self.axes, Vector::new(x, y, 0.0) - self.origin_m);
+        self.shape.chord(start, self.axes[2]).map_or(f64::INFINITY, |[enter, _]| enter)
+    }
+
+    /// Lowest and highest (x, y) of a box around what of it is below z = 0, m.
+    pub(crate) fn below_m(&self) -> [[f64; 2]; 2] {
+        let mut reach = [0, 1].map(|k| self.axes[k].abs().dot(self.half_m));
+        if let Primitive::Ellipsoid([a, b, c]) = self.shape
+            && a == b
+            && b == c
+            && self.origin_m.z > 0.0
+        {
+            reach = [(a * a - self.origin_m.z * self.origin_m.z).max(0.0).sqrt(); 2];
+        }
+        let at = [self.origin_m.x, self.origin_m.y];
+        [[at[0] - reach[0], at[1] - reach[1]], [at[0] + reach[0], at[1] + reach[1]]]
+    }
 }
 
 impl Standing<'_> {
     pub(super) fn solid(&self) -> &Solid {
         self.solid
+    }
+
+    /// Its parts; none of a mesh.
+    pub(crate) fn parts(&self) -> &[StandingPart] {
+        &self.parts
+    }
+
+    /// Whether it has parts alone whose surface nowhere turns on a radius below `radius_m`.
+    pub(crate) fn is_smooth(&self, radius_m: f64) -> bool {
+        let smooth = |part: &StandingPart| match part.shape {
+            Primitive::Ellipsoid([a, b, c]) => a.min(b).min(c).powi(2) >= radius_m * a.max(b).max(c),
+            Primitive::Capsule(own_m, _) => own_m >= radius_m,
+            Primitive::Cuboid(_) | Primitive::Cylinder(..) | Primitive::HalfSpace => false,
+        };
+        !self.parts.is_empty() && self.parts.iter().all(smooth)
     }
 
     /// How deep the solid reaches into a column of foam, from its free surface, m, or, as a negative depth, the gap to
@@ -245,7 +293,7 @@ impl Standing<'_> {
         while pending {
             pending = false;
             first_m = f64::INFINITY;
-            for (shape, axes, origin_m, half_m) in &self.parts {
+            for StandingPart { shape, axes, origin_m, half_m } in &self.parts {
                 let base_m = into(axes, base_m - *origin_m);
                 let far = match shape {
                     Primitive::HalfSpace => base_m.z > reach_m,
@@ -279,7 +327,7 @@ impl Standing<'_> {
             beside_m.max_element() > 0.0 && (beside_m.max_element() > radius_m || beside_m.cmpgt(reach()).any())
         };
         match &*self.solid.form {
-            Form::Parts(_) => self.parts.iter().all(|(shape, axes, origin_m, half)| {
+            Form::Parts(_) => self.parts.iter().all(|StandingPart { shape, axes, origin_m, half_m: half }| {
                 let away = centre_m - *origin_m;
                 if let Primitive::HalfSpace = shape {
                     let up = Vector::new(axes[0].z, axes[1].z, axes[2].z);
@@ -387,7 +435,8 @@ impl Solid {
             // world = R_b (R_p · part + p) + o; a row of R_b R_p is a column of its inverse
             let columns = [0, 1, 2].map(|j| turned(Vector::from(part.rotation.map(|row| row[j]))));
             let rows = [0, 1, 2].map(|i| Vector::new(columns[0][i], columns[1][i], columns[2][i]));
-            (part.shape, rows, turned(Vector::from(part.position_m)) + origin_m, part.shape.reach_m())
+            let origin_m = turned(Vector::from(part.position_m)) + origin_m;
+            StandingPart { shape: part.shape, axes: rows, origin_m, half_m: part.shape.reach_m() }
         });
         Standing { solid: self, axes, origin_m, parts: parts.collect() }
     }
