@@ -506,11 +506,8 @@ mod tests {
         let mut found = 0;
         for number in 0..400 {
             let [a, b, c, capsule_m, half_m] = [(); 5].map(|()| rng.random_range(12e-3..40e-3));
-            let shape = if number % 2 == 0 {
-                Primitive::Ellipsoid([a, b, c])
-            } else {
-                Primitive::Capsule(capsule_m, half_m)
-            };
+            let shape =
+                if number % 2 == 0 { Primitive::Ellipsoid([a, b, c]) } else { Primitive::Capsule(capsule_m, half_m) };
             let [u, v, w]: [f64; 3] = [(); 3].map(|()| rng.random_range(-3.0..3.0));
             let ((su, cu), (sv, cv), (sw, cw)) = (u.sin_cos(), v.sin_cos(), w.sin_cos());
             let rotation = [

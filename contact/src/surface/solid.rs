@@ -227,8 +227,7 @@ impl StandingPart {
     pub(crate) fn below_m(&self) -> [[f64; 2]; 2] {
         let mut reach = [0, 1].map(|k| self.axes[k].abs().dot(self.half_m));
         if let Primitive::Ellipsoid([a, b, c]) = self.shape
-            && a == b
-            && b == c
+            && a.max(b).max(c) <= a.min(b).min(c)
             && self.origin_m.z > 0.0
         {
             reach = [(a * a - self.origin_m.z * self.origin_m.z).max(0.0).sqrt(); 2];

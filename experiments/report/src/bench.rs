@@ -100,7 +100,7 @@ fn ranking_table(ranking: &Ranking) -> Table<'_, &Ranked> {
         .file("worst_iou", |d| d.worst.1)
         .file("worst_object", |d| &d.worst.0)
         .shown("worst", |d| format!("{} {:.2}", d.worst.0, d.worst.1))
-        .column("points", "points of middle", |d| d.points)
+        .column("points", "points of small, thin, broad, middle", |d| d.points)
         .digits(1)
 }
 
@@ -126,9 +126,9 @@ pub fn write_leaderboard(cards: &[Card], ranking: Option<&Ranking>, out: OutputF
             if own.is_empty() {
                 continue;
             }
-            save_charts(&charts(&own), &figures, track.name())?;
+            save_charts(&charts(&own[..own.len().min(CURVES)]), &figures, track.name())?;
             let alt = format!("score over the number of measurements, task by task, track {}", track.name());
-            let caption = "A panel a task; scores with 95 % intervals over skins and touches.";
+            let caption = "The six with most points, a panel a task; 95 % intervals over skins and touches.";
             sections.push(Section {
                 id: track.name().to_owned(),
                 title: format!("Track: {}", track.name()),
@@ -169,6 +169,9 @@ fn lead(track: Track) -> &'static str {
         Track::Readout => "What is measured is the entrant's own.",
     }
 }
+
+/// Most entrants in a figure: more colours are not told apart.
+const CURVES: usize = 6;
 
 /// A panel for every task: scores over the number of measurements.
 fn charts(cards: &[&Card]) -> Vec<crate::figures::Chart> {
