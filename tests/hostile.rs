@@ -231,9 +231,12 @@ fidelity --scene missing.toml | missing.toml
 fidelity --scene T --scene T | twice
 fidelity --cells 0 | [1, 24]
 fidelity --cells x | --cells
-bench run magic | magic | valid: auto
+bench run magic | magic | valid names: auto
 bench run auto --tasks big | --tasks | big | small
-bench run auto --track rows | auto | valid: random, cosine_signs
+bench run auto --track rows | auto | is of the track decoder
+bench run nobody --track rows | nobody | valid names: random, cosine_signs
+bench run auto= | auto= | no command
+bench run auto=cat | auto | another name
 bench run missing.py | missing.py | no such file
 bench run auto --seed -1 | `--seed` = -1
 bench verify missing.json | missing.json

@@ -16,8 +16,12 @@ class LearnedRows:
     def fit(self, train):
         self.x = jnp.array(train.images / np.linalg.norm(train.images, axis=1, keepdims=True)).T
         self.c = self.x @ self.x.T / self.x.shape[1]
+        self.signs = {m: self.learned(m) for m in train.measurements}
 
     def rows(self, m):
+        return self.signs[m]
+
+    def learned(self, m):
         soft = jnp.array(np.random.default_rng(m).standard_normal((m, self.x.shape[0])))
 
         def left(soft):

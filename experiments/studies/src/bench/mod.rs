@@ -516,7 +516,8 @@ mod tests {
         assert_eq!(Choice::named("random", None).map(|c| c.track).ok(), Some(Track::Rows));
         assert_eq!(Choice::named("amortised", None).map(|c| c.track).ok(), Some(Track::Decoder));
         assert_eq!(Choice::named("events", None).map(|c| c.track).ok(), Some(Track::Readout));
-        let error = Choice::named("events", Some(Track::Rows)).err().unwrap().to_string();
-        assert!(error.contains("valid: random, cosine_signs"), "{error}");
+        let error = |name: &str| Choice::named(name, Some(Track::Rows)).err().unwrap().to_string();
+        assert_eq!(error("events"), "\"events\" is of the track readout");
+        assert!(error("nobody").contains("valid names: random, cosine_signs"), "{}", error("nobody"));
     }
 }
