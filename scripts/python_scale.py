@@ -1,6 +1,6 @@
 """What a step costs with 10,000 to a million taxels, beside MuJoCo's bare step, its tactile sensor, and MIMo's way.
 
-python scripts/python_scale.py [--taxels 10000 100000] [--touched 1 5 20] [--steps 1000] [--json]
+python scripts/python_scale.py [--taxels 10000 100000] [--touched 1 5 20] [--steps 500] [--json]
 
 Twenty plates wear taxels 5 mm apart; a ball of 50 mm radius and 1 kg rolls to and fro on each of the touched ones. What
 is touched is the same for any number of taxels. All that is compared steps by turns in one process, on one core.
@@ -99,10 +99,9 @@ def in_mimos_style(model, data, side):
         forces[:] = 0.0
         for number in range(data.ncon):
             contact = data.contact[number]
-            body = model.geom_bodyid[contact.geom1]
-            plate = plates.get(body)
-            if plate is None:
-                continue
+            # the ball comes first in the pair: the contact's force is that on the plate
+            body = model.geom_bodyid[contact.geom2]
+            plate = plates[body]
             mujoco.mj_contactForce(model, data, number, force)
             at = contact.pos - data.xpos[body]
             near = trees[plate].query_ball_point(at, 5.0 * PITCH)

@@ -54,7 +54,7 @@ impl Body {
         Ok(Self { body, stiffness_pa_per_m })
     }
 
-    /// One convex shape in its own axes, with the mesh that stands for it on flat skins.
+    /// One convex shape in its own axes, with the mesh of its surface.
     fn shaped(mesh: TriMesh, shape: Primitive, stiffness: Option<f64>) -> PyResult<Self> {
         let rotation = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]];
         Self::new(mesh, vec![Part { shape, rotation, position_m: [0.0; 3] }], stiffness)

@@ -475,7 +475,8 @@ impl Skin {
             state.time_s += dt;
             let [means, electrodes] = [state.skin.pressure(), state.skin.electrode_pressure()];
             let of = |k: &usize| (*k, [means.values()[*k], electrodes.values()[*k]]);
-            let felt = Felt { shape: [means.rows(), means.cols()], pa: state.skin.touched().iter().map(of).collect() };
+            let felt =
+                Pressures { shape: [means.rows(), means.cols()], pa: state.skin.touched().iter().map(of).collect() };
             let scalars = [state.skin.touched_m2(), state.time_s];
             (wrenches, felt, scalars, (state.touches, state.skin.bottomed()))
         });
@@ -563,21 +564,20 @@ pub(crate) struct Touch {
     /// Whether a body has gone through the foam, down to the link: the pressure there is no measured one.
     #[pyo3(get)]
     bottomed: bool,
-    pub(crate) felt: Arc<Felt>,
+    pub(crate) felt: Arc<Pressures>,
     /// Which skin.
     pub(crate) skin: u64,
 }
 
 /// The pressures of a skin.
-#[derive(Debug, PartialEq)]
-pub(crate) struct Felt {
+pub(crate) struct Pressures {
     /// Rows and columns.
     shape: [usize; 2],
     /// Taxels that may have a pressure, in their order: number, and mean pressure over its area and its electrode, Pa.
     pa: Vec<(usize, [f64; 2])>,
 }
 
-impl Felt {
+impl Pressures {
     /// Pressures over areas and electrodes, row by row.
     fn of(shape: [usize; 2], means: &[f64], electrodes: &[f64]) -> Self {
         let all = means.iter().zip(electrodes).map(|(p, electrode)| [*p, *electrode]).enumerate();
@@ -615,7 +615,7 @@ impl Touch {
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "a number of touches")]
             number: number as u64,
             bottomed: false,
-            felt: Arc::new(Felt::of(shape, pressure.values(), pressure.values())),
+            felt: Arc::new(Pressures::of(shape, pressure.values(), pressure.values())),
             skin,
         }
     }
@@ -713,7 +713,7 @@ impl Touch {
             bail!("a touch of {rows} x {cols} taxels with {} pressures", felt.len());
         }
         let means: Vec<f64> = pressure.readonly().as_array().iter().copied().collect();
-        let felt = Arc::new(Felt::of([rows, cols], &means, &felt));
+        let felt = Arc::new(Pressures::of([rows, cols], &means, &felt));
         let (pressure, wrenches, loads) = (pressure.unbind().into(), wrenches.unbind().into(), Default::default());
         Ok(Self { pressure, wrenches, loads, area, time, number, bottomed, felt, skin })
     }

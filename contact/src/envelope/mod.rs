@@ -126,7 +126,7 @@ impl Envelope {
     }
 
     /// As [`Envelope::rasterise`] for a body of closed forms, exact at the centres of cells. `None`, and nothing is
-    /// done, if a part is none that is smooth over a cell.
+    /// done, if a part has an edge, or curves more sharply than a cell.
     pub(crate) fn sample(&mut self, body: &Standing<'_>) -> Option<Patch> {
         let raster = &self.raster;
         if !body.is_smooth(raster.cell_m) {
@@ -135,7 +135,7 @@ impl Envelope {
         self.clear();
         self.known.stand = Stand::default();
         for part in body.parts() {
-            let [low, high] = part.below_m();
+            let Some([low, high]) = part.below_m() else { continue };
             let [[left, bottom], [right, top]] = [low, high].map(|at| self.raster.cells(at));
             let Some(patch) = self.raster.span([[left, bottom, 0.0], [right, top, 0.0], [left, top, 0.0]]) else {
                 continue;

@@ -223,8 +223,12 @@ impl StandingPart {
         self.shape.chord(start, self.axes[2]).map_or(f64::INFINITY, |[enter, _]| enter)
     }
 
-    /// Lowest and highest (x, y) of a box around what of it is below z = 0, m.
-    pub(crate) fn below_m(&self) -> [[f64; 2]; 2] {
+    /// Lowest and highest (x, y) of a box, which may be too large, around what of it is below z = 0, m; `None` if
+    /// nothing is.
+    pub(crate) fn below_m(&self) -> Option<[[f64; 2]; 2]> {
+        if self.origin_m.z >= self.axes[2].abs().dot(self.half_m) {
+            return None;
+        }
         let mut reach = [0, 1].map(|k| self.axes[k].abs().dot(self.half_m));
         if let Primitive::Ellipsoid([a, b, c]) = self.shape
             && a.max(b).max(c) <= a.min(b).min(c)
@@ -233,7 +237,7 @@ impl StandingPart {
             reach = [(a * a - self.origin_m.z * self.origin_m.z).max(0.0).sqrt(); 2];
         }
         let at = [self.origin_m.x, self.origin_m.y];
-        [[at[0] - reach[0], at[1] - reach[1]], [at[0] + reach[0], at[1] + reach[1]]]
+        Some([[at[0] - reach[0], at[1] - reach[1]], [at[0] + reach[0], at[1] + reach[1]]])
     }
 }
 
@@ -247,7 +251,7 @@ impl Standing<'_> {
         &self.parts
     }
 
-    /// Whether it has parts alone whose surface nowhere turns on a radius below `radius_m`.
+    /// Whether all of it is ellipsoids and capsules, with radii of curvature of at least `radius_m`.
     pub(crate) fn is_smooth(&self, radius_m: f64) -> bool {
         let smooth = |part: &StandingPart| match part.shape {
             Primitive::Ellipsoid([a, b, c]) => a.min(b).min(c).powi(2) >= radius_m * a.max(b).max(c),

@@ -259,6 +259,10 @@ impl RunCommand {
             let problem = format!("`--tasks`: {} is not for the track {}", task.name, bench.choice.track.name());
             return Err(Refusal::new(problem).into());
         }
+        if let Some(task) = self.skip.iter().find(|task| !tasks.contains(task)) {
+            let problem = format!("`--skip`: {} is not among the tasks of this run", task.name);
+            return Err(Refusal::new(problem).into());
+        }
         let split = match (self.public, self.seed) {
             (true, _) => Split::Public,
             (false, Some(seed)) => Split::Fresh(seed),
@@ -408,7 +412,8 @@ impl TableCommand {
             let card = read(file)?;
             card.check().map_err(|e| e.at(file.display())).map(|()| card)
         };
-        let cards = unique(files.iter()).into_iter().map(checked).collect::<Result<Vec<Card>, Refusal>>()?;
+        let files = unique(files);
+        let cards = files.iter().map(checked).collect::<Result<Vec<Card>, Refusal>>()?;
         let like = |card: &Card| (card.suite.clone(), card.split.clone(), card.quick);
         if let Some((file, other)) = files.iter().zip(&cards).find(|(_, card)| like(card) != like(&cards[0])) {
             let said = |card: &Card| format!("{} of {}, quick {}", card.split, card.suite, card.quick);

@@ -18,8 +18,8 @@ def say(**answer):
 
 def levels(lines):
     """Rows of signs or numbers as an array, M × N."""
-    signs = lines and isinstance(lines[0], str)
-    return np.array([[1.0 if sign == "+" else -1.0 for sign in line] for line in lines] if signs else lines, float)
+    texts = lines and isinstance(lines[0], str)
+    return np.array([[1.0 if sign == "+" else -1.0 for sign in line] for line in lines] if texts else lines, float)
 
 
 def measured(rows):
@@ -28,8 +28,8 @@ def measured(rows):
     taxels = header["rows"] * header["cols"]
     if rows.shape[1] != taxels or not (np.abs(rows) <= 1.0).all():
         sys.exit(f"{FILE}: levels to measure are an array {rows.shape}; valid: (rows, {taxels}), each in [-1, 1]")
-    signs = np.isin(rows, (-1, 0, 1)).all()
-    say(measure=["".join("-0+"[int(w) + 1] for w in row) for row in rows] if signs else rows.tolist())
+    whole = np.isin(rows, (-1, 0, 1)).all()
+    say(measure=["".join("-0+"[int(w) + 1] for w in row) for row in rows] if whole else rows.tolist())
     return np.array(json.loads(sys.stdin.readline())["y"])
 
 

@@ -271,9 +271,12 @@ impl Choice {
             Track::Rows => &["rows", "predict"],
             Track::Readout => &["read"],
         };
+        // a file of Python with no class may be a program of its own, if its first line says who runs it
         let file = Path::new(&command.command);
-        let python = file.extension().is_some_and(|e| e == "py") && file.is_file();
-        if let Some(method) = needed.iter().find(|method| python && !has(method)) {
+        let is_python = file.extension().is_some_and(|e| e == "py") && file.is_file();
+        let runs = || std::fs::read(file).is_ok_and(|bytes| bytes.starts_with(b"#!"));
+        let needs_class = class.is_some() || (is_python && !runs());
+        if let Some(method) = needed.iter().find(|method| needs_class && !has(method)) {
             let problem = format!("no class with a method `{method}`, which the track {} needs", track.name());
             return Err(Refusal::new(problem).at(&command.command));
         }
