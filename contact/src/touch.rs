@@ -22,8 +22,8 @@ pub struct TouchBody {
 }
 
 impl TouchBody {
-    /// A body of convex parts. Flat skins take the parts if all are ellipsoids or capsules, none sharper than a square of
-    /// the grid; else `mesh`, which must have the same surface.
+    /// A body of convex parts. Flat skins take the parts if all are ellipsoids or capsules, none sharper than a square
+    /// of the grid; else `mesh`, which must have the same surface.
     pub fn of_parts(mesh: PreparedMesh, parts: Vec<Part>) -> Self {
         Self { solid: Solid::of_parts(parts), mesh }
     }

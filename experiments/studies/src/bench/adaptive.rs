@@ -133,7 +133,8 @@ impl Reader for &Adaptive {
 }
 
 /// A binary search: the sum of a part of the sheet, and where it is beyond the alarm, of its halves, the largest part
-/// first. A part that was not divided has its sum spread over its taxels, if it or the part that it is half of is touched.
+/// first. A part that was not divided has its sum spread over its taxels, if it or the part that it is half of is
+/// touched.
 pub(super) struct BinarySearch {
     /// Each before its halves. The first is all of the sheet.
     parts: Vec<Part>,
