@@ -118,7 +118,7 @@ def entries(side, touched, kinds):
             model, data = scene(side, touched, sensor=True)
         else:
             model, data = scene(side, touched)
-        taxels = None
+        worn = None
         if kind in ("bare", "tactile"):
             step = lambda model=model, data=data: mujoco.mj_step(model, data)  # noqa: E731
         elif kind == "mimo":
@@ -127,7 +127,6 @@ def entries(side, touched, kinds):
             mode = kind.split("+")[0]
             worn = skins(model, data, side, mode, touched)
             group = spts.mujoco._Group(worn)
-            taxels = worn
             if kind.endswith("wires"):
                 wires = [spts.Wire(a.skin, seed=k) for k, a in enumerate(worn)]
 
@@ -142,7 +141,7 @@ def entries(side, touched, kinds):
                     for attachment in worn:
                         attachment.last  # noqa: B018
 
-        yield kind, model, data, step, taxels
+        yield kind, model, data, step, worn
 
 
 def moved(model, data, count):

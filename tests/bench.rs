@@ -53,9 +53,16 @@ fn a_card_does_not_depend_on_the_threads_and_is_verified() {
     let differs = spts(dir.path(), &words("bench verify cards/1.json"));
     let said = String::from_utf8_lossy(&differs.stderr);
     assert!(differs.status.code() == Some(1) && said.contains("small.score at 7 measurements"), "{said}");
+    refused(dir.path(), &words("bench table cards/1.json"), &["`tasks[0]` small: `points`"]);
     std::fs::write(&file, text.replace("\"official\": false", "\"official\": true")).unwrap();
+    refused(dir.path(), &words("bench table cards/1.json"), &["`official` = true"]);
     let differs = spts(dir.path(), &words("bench verify cards/1.json"));
     assert!(String::from_utf8_lossy(&differs.stderr).contains("`official`: the card has true; run again it is false"));
+    // a task that is left out has no points, and is left out again
+    let skipped = run(dir.path(), &words("auto --quick --tasks small,thin --skip thin --save cards/skip.json"));
+    assert_eq!(skipped["tasks"][1]["refused"], "left out by --skip");
+    assert_eq!(skipped["points"]["mean"].as_f64(), card["tasks"][0]["points"]["mean"].as_f64().map(|p| 0.5 * p));
+    succeeds(dir.path(), &words("bench verify cards/skip.json"));
     // as a leaderboard
     succeeds(dir.path(), &words("bench table cards/3.json --out board"));
     for name in ["index.html", "cards.json", "tables/leaderboard.csv", "figures/decoder.png"] {

@@ -178,12 +178,8 @@ impl Bench {
         };
         let built = if left_out { Err(Refusal::new(SKIPPED)) } else { self.choice.build(&prepared) };
         let entrant = match built {
-            Err(_) if left_out => {
-                card.refused = Some(SKIPPED.to_owned());
-                return Ok(Scored { card, values: Vec::new(), times_s: Vec::new() });
-            }
             Ok(entrant) => entrant,
-            Err(refusal) if self.choice.is_program() => return Err(refusal),
+            Err(refusal) if self.choice.is_program() && !left_out => return Err(refusal),
             Err(refusal) => {
                 card.refused = Some(refusal.to_string());
                 return Ok(Scored { card, values: Vec::new(), times_s: Vec::new() });
