@@ -51,6 +51,7 @@ pub fn check_transducer(build: &dyn Fn(&SkinLayout) -> Box<dyn Transducer>) {
     check_rest(build, &skin);
     check_repeats(build, &skin);
     check_sessions(build, &skin);
+    check_touched(build, &skin);
     for (name, wave) in waveforms() {
         for pieces in [&[0.5, 0.5][..], &[1e-9, 0.3, 1e-6, 0.7], &[1e-3; 1000]] {
             check_cut(build, &skin, name, &wave, pieces);
@@ -103,6 +104,33 @@ fn steps(transducer: &mut dyn Transducer, skin: &SkinLayout, holds: &[Hold]) -> 
 /// Conductance of all taxels after the last of `holds`, S.
 fn end(build: Build<'_>, skin: &SkinLayout, holds: &[Hold]) -> Vec<f64> {
     run(build, skin, holds).pop().map_or_else(Vec::new, |map| map.values().to_vec())
+}
+
+/// Steps of the touched taxels alone are those of the skin; a taxel that was left alone may differ by the roundings of
+/// its steps and by what it takes for nothing.
+fn check_touched(build: Build<'_>, skin: &SkinLayout) {
+    let (mut whole, mut touched) = (build(skin), build(skin));
+    let (mut map, mut some) = (ConductanceMap::zeros(skin.rows(), skin.cols()), Vec::new());
+    for n in 0_u32..400 {
+        // two contacts that come and go, one of them every other step
+        let pressed: Vec<(u32, f64)> = (0_u32..100)
+            .filter(|k| k / 10 == n / 40 || *k == 55 && n % 2 == 0 || *k == 77 && !(50..300).contains(&n))
+            .map(|k| (k, 1e3 * f64::from(1 + (k * 7 + n * 3) % 40)))
+            .collect();
+        let mut pressure = PressureMap::zeros(skin.rows(), skin.cols());
+        pressed.iter().for_each(|(k, pa)| pressure.values_mut()[*k as usize] = *pa);
+        let dt_s = [1e-3, 0.02, 1e-4][n as usize % 3];
+        whole.step(&pressure, dt_s, &mut map);
+        if !touched.step_touched(&pressed, dt_s, &mut some) {
+            return;
+        }
+        let mut found = vec![0.0; skin.taxels()];
+        some.iter().for_each(|(k, g)| found[*k as usize] = *g);
+        for (k, (g, expected)) in found.iter().zip(map.values()).enumerate() {
+            let off = (g - expected).abs();
+            assert!(off <= 1e-12 * expected + 1e-24, "step {n}: taxel {k} conducts {g} S, {expected} in a whole step");
+        }
+    }
 }
 
 fn check_state(build: Build<'_>, skin: &SkinLayout, name: &str, wave: &[Hold]) {

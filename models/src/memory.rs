@@ -399,6 +399,11 @@ impl Creep {
         let sum = self.slow.relax(target, &decays.slow, slow);
         self.lag.respond(elastic_s, decays.fast, delayed_s) * (1.0 + self.gain * sum)
     }
+
+    /// Ends the fast branch of an unloaded taxel's `state`: it conducts nothing from here on.
+    pub(crate) fn settle(state: &mut [f64]) {
+        state.last_mut().into_iter().for_each(|delayed_s| *delayed_s = 0.0);
+    }
 }
 
 // Conditioning: a taxel of Velostat conducts more from press to press of a session.

@@ -89,6 +89,19 @@ impl Snapshot {
         values.into_iter().for_each(|value| self.f64(value));
     }
 
+    /// Saves or loads a list of any length.
+    pub fn u32s(&mut self, values: &mut Vec<u32>) {
+        let mut count = values.len() as u64;
+        self.u64(&mut count);
+        // no list is longer than all that was saved
+        values.resize(usize::try_from(count).unwrap_or(usize::MAX).min(self.words.len()), 0);
+        for value in values {
+            let mut word = u64::from(*value);
+            self.u64(&mut word);
+            *value = u32::try_from(word).unwrap_or(u32::MAX);
+        }
+    }
+
     /// Saves or loads a flag.
     pub fn flag(&mut self, value: &mut bool) {
         let mut word = u64::from(*value);

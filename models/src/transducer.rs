@@ -33,6 +33,15 @@ pub trait Transducer: Send + Sync {
     /// then the instantaneous conductance. Negative pressure and NaN count as zero.
     fn step(&mut self, pressure: &PressureMap, dt_s: f64, out: &mut ConductanceMap);
 
+    /// [`step`](Self::step) with pressure on the taxels `pressed` alone, Pa, in the order of their numbers. Writes the
+    /// number and the conductance, S, of every taxel that conducts now or did before the step to `out`, in the same
+    /// order; whatever is not there conducts nothing. Its cost is that of these taxels, not of the skin. `false`, and
+    /// nothing is done: this transducer has no such way, or an untouched taxel conducts.
+    fn step_touched(&mut self, pressed: &[(u32, f64)], dt_s: f64, out: &mut Vec<(u32, f64)>) -> bool {
+        let _ = (pressed, dt_s, out);
+        false
+    }
+
     /// Leaves the skin unloaded for `dt_s` seconds, as between two presses.
     fn rest(&mut self, dt_s: f64);
 
@@ -84,6 +93,12 @@ impl Transducer for OnElectrode {
     fn step(&mut self, pressure: &PressureMap, dt_s: f64, out: &mut ConductanceMap) {
         self.calibrated.step(pressure, dt_s, out);
         out.values_mut().iter_mut().for_each(|g| *g *= self.relative_area);
+    }
+
+    fn step_touched(&mut self, pressed: &[(u32, f64)], dt_s: f64, out: &mut Vec<(u32, f64)>) -> bool {
+        let known = self.calibrated.step_touched(pressed, dt_s, out);
+        out.iter_mut().for_each(|(_, g)| *g *= self.relative_area);
+        known
     }
 
     fn rest(&mut self, dt_s: f64) {

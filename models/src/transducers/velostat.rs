@@ -125,22 +125,37 @@ pub struct Velostat {
     streams: Streams,
     /// Fixed gain of every taxel.
     fixed: Vec<f64>,
-    taxels: Vec<Taxel>,
-    /// State of the play operators, taxel by taxel.
+    /// Gain of every taxel in this session.
+    gains: Vec<f64>,
+    /// 1 + place in `loaded` of every taxel that has been loaded in this session; 0 for the others, which have no state.
+    places: Vec<u32>,
+    loaded: Vec<Loaded>,
+    /// State of the play operators of the loaded taxels, in their order.
     plays: Vec<f64>,
-    /// State of the creep branches, taxel by taxel.
+    /// State of their creep branches.
     slow: Vec<f64>,
-    /// Scratch: decay of every branch over the step.
+    /// Taxels that conduct, in order, if `known`: after a step of the touched ones.
+    conducting: Vec<u32>,
+    known: bool,
+    /// Scratch: those before the step.
+    conducted: Vec<u32>,
+    /// Time of the session, s.
+    time_s: f64,
+    /// Scratch: decay of every branch over the step, and over the time for which a taxel was not touched.
     decays: CreepDecays,
+    idle_decays: CreepDecays,
 }
 
 #[derive(Debug, Clone)]
-struct Taxel {
-    gain: f64,
+struct Loaded {
+    taxel: u32,
     presses: Presses,
-    /// Whether the sheet has been loaded in this session. Until then its state does not change.
-    loaded: bool,
+    /// Time of its state, s. Nothing has touched it since.
+    since_s: f64,
 }
+
+/// A released taxel that conducts less than this conducts nothing, S: 1e-21 V at the output.
+const NEGLIGIBLE_S: f64 = 1e-25;
 
 impl Velostat {
     /// A fresh sheet on `skin` in session 0. The taxels' gains come from `streams`: equal streams give the same sheet.
@@ -174,10 +189,17 @@ impl Velostat {
             skin: *skin,
             fixed,
             conditioning: c.conditioning.checked()?,
-            taxels: Vec::with_capacity(taxels),
-            plays: vec![0.0; taxels * hysteresis.operators()],
-            slow: vec![0.0; taxels * creep.branches()],
+            gains: Vec::new(),
+            places: vec![0; taxels],
+            loaded: Vec::new(),
+            plays: Vec::new(),
+            slow: Vec::new(),
+            conducting: Vec::new(),
+            known: true,
+            conducted: Vec::new(),
+            time_s: 0.0,
             decays: creep.decays(),
+            idle_decays: creep.decays(),
             hysteresis,
             creep,
             streams,
@@ -188,45 +210,132 @@ impl Velostat {
 
     /// Gain of every taxel in this session: the fixed gain (median 1) times that of the session.
     pub fn gains(&self) -> impl Iterator<Item = f64> + '_ {
-        self.taxels.iter().map(|t| t.gain)
+        self.gains.iter().copied()
     }
 
-    fn respond(&mut self, k: usize, pressure_pa: f64) -> f64 {
-        let taxel = &mut self.taxels[k];
-        taxel.loaded |= pressure_pa > 0.0;
-        if !taxel.loaded {
-            return self.warmth * self.unloaded_s;
+    /// Begins a step of `dt_s`; the time at its end, s.
+    fn begin(&mut self, dt_s: f64) -> f64 {
+        let dt_s = elapsed_s(dt_s);
+        self.creep.set_step(dt_s, &mut self.decays);
+        self.time_s + dt_s
+    }
+
+    /// Conductance of taxel `k` at the end of the step, `end_s`, S.
+    fn respond(&mut self, k: usize, pressure_pa: f64, end_s: f64) -> f64 {
+        let place = match self.places[k] {
+            0 if pressure_pa > 0.0 => self.load(k),
+            0 => return self.warmth * self.unloaded_s,
+            place => place as usize - 1,
+        };
+        let idle_s = self.time_s - self.loaded[place].since_s;
+        if idle_s > 0.0 {
+            self.creep.set_step(idle_s, &mut self.idle_decays);
+            self.advance(place, 0.0, true);
         }
+        self.loaded[place].since_s = end_s;
+        self.advance(place, pressure_pa, false)
+    }
+
+    /// Gives taxel `k` a state; its place.
+    #[expect(clippy::cast_possible_truncation, reason = "a layout has fewer than 2^32 taxels")]
+    fn load(&mut self, k: usize) -> usize {
+        let presses = self.conditioning.fresh();
+        self.loaded.push(Loaded { taxel: k as u32, presses, since_s: self.time_s });
+        self.plays.resize(self.loaded.len() * self.hysteresis.operators(), 0.0);
+        self.slow.resize(self.loaded.len() * self.creep.branches(), 0.0);
+        self.places[k] = self.loaded.len() as u32;
+        self.loaded.len() - 1
+    }
+
+    /// Moves the state at `place` over the step, or over the time without a touch before it.
+    fn advance(&mut self, place: usize, pressure_pa: f64, idle: bool) -> f64 {
+        let decays = if idle { &self.idle_decays } else { &self.decays };
         let (operators, branches) = (self.hysteresis.operators(), self.creep.branches());
-        let effective_pa = self.hysteresis.respond(pressure_pa, &mut self.plays[k * operators..(k + 1) * operators]);
+        let plays = &mut self.plays[place * operators..(place + 1) * operators];
+        let effective_pa = self.hysteresis.respond(pressure_pa, plays);
         let elastic_s = self.law.conductance_s(effective_pa);
-        let slow = &mut self.slow[k * branches..(k + 1) * branches];
-        let crept_s = self.creep.respond(pressure_pa, elastic_s, &self.decays, slow);
-        let gain = taxel.gain * self.conditioning.respond(pressure_pa, &mut taxel.presses);
+        let slow = &mut self.slow[place * branches..(place + 1) * branches];
+        let crept_s = self.creep.respond(pressure_pa, elastic_s, decays, slow);
+        let taxel = &mut self.loaded[place];
+        let gain = self.gains[taxel.taxel as usize] * self.conditioning.respond(pressure_pa, &mut taxel.presses);
         self.warmth * (self.unloaded_s + gain * crept_s)
     }
 }
 
 impl Transducer for Velostat {
     fn step(&mut self, pressure: &PressureMap, dt_s: f64, out: &mut ConductanceMap) {
-        self.creep.set_step(elapsed_s(dt_s), &mut self.decays);
-        for (k, (out, &p)) in out.values_mut().iter_mut().zip(pressure.values()).enumerate().take(self.taxels.len()) {
-            *out = self.respond(k, loaded_pa(p));
+        let end_s = self.begin(dt_s);
+        for (k, (out, &p)) in out.values_mut().iter_mut().zip(pressure.values()).enumerate().take(self.places.len()) {
+            *out = self.respond(k, loaded_pa(p), end_s);
         }
+        self.time_s = end_s;
+        self.known = false;
+    }
+
+    fn step_touched(&mut self, pressed: &[(u32, f64)], dt_s: f64, out: &mut Vec<(u32, f64)>) -> bool {
+        if self.unloaded_s > 0.0 {
+            return false;
+        }
+        let end_s = self.begin(dt_s);
+        std::mem::swap(&mut self.conducting, &mut self.conducted);
+        self.conducting.clear();
+        if !std::mem::replace(&mut self.known, true) {
+            self.conducted.clear();
+            self.conducted.extend(self.loaded.iter().map(|loaded| loaded.taxel));
+            self.conducted.sort_unstable();
+        }
+        let mut pressed = pressed.iter().map(|(k, pa)| (*k, loaded_pa(*pa))).filter(|(_, pa)| *pa > 0.0).peekable();
+        let mut done = 0;
+        out.clear();
+        loop {
+            let before = self.conducted.get(done).copied();
+            let Some(k) = pressed.peek().map(|(k, _)| *k).into_iter().chain(before).min() else {
+                break;
+            };
+            let pressure_pa = pressed.next_if(|(other, _)| *other == k).map_or(0.0, |(_, pa)| pa);
+            done += usize::from(before == Some(k));
+            let mut conductance_s = self.respond(k as usize, pressure_pa, end_s);
+            if pressure_pa > 0.0 || conductance_s > NEGLIGIBLE_S {
+                self.conducting.push(k);
+            } else {
+                let (place, branches) = (self.places[k as usize] as usize, self.creep.branches());
+                if let Some(place) = place.checked_sub(1) {
+                    Creep::settle(&mut self.slow[place * branches..(place + 1) * branches]);
+                }
+                conductance_s = 0.0;
+            }
+            out.push((k, conductance_s));
+        }
+        self.time_s = end_s;
+        true
     }
 
     fn rest(&mut self, dt_s: f64) {
-        self.creep.set_step(elapsed_s(dt_s), &mut self.decays);
-        for k in 0..self.taxels.len() {
-            self.respond(k, 0.0);
+        let end_s = self.begin(dt_s);
+        for place in 0..self.loaded.len() {
+            self.respond(self.loaded[place].taxel as usize, 0.0, end_s);
         }
+        self.time_s = end_s;
     }
 
     fn exchange(&mut self, state: &mut Snapshot) {
-        for taxel in &mut self.taxels {
-            state.f64(&mut taxel.gain);
-            state.flag(&mut taxel.loaded);
-            taxel.presses.exchange(state);
+        state.f64s(&mut self.gains);
+        state.f64(&mut self.time_s);
+        state.flag(&mut self.known);
+        let own: Vec<u32> = self.loaded.iter().map(|loaded| loaded.taxel).collect();
+        let mut loaded = own.clone();
+        for list in [&mut self.conducting, &mut loaded] {
+            state.u32s(list);
+            list.retain(|k| (*k as usize) < self.places.len());
+        }
+        if loaded != own {
+            self.places.fill(0);
+            (self.loaded.clear(), self.plays.clear(), self.slow.clear());
+            loaded.iter().for_each(|k| drop(self.load(*k as usize)));
+        }
+        for loaded in &mut self.loaded {
+            state.f64(&mut loaded.since_s);
+            loaded.presses.exchange(state);
         }
         state.f64s(self.plays.iter_mut().chain(&mut self.slow));
     }
@@ -241,11 +350,14 @@ impl Transducer for Velostat {
             move || -> f64 { StandardNormal.sample(&mut rng) }
         });
         let gains = self.mounting.factors(&self.skin, [slopes(), slopes()], each);
-        let presses = self.conditioning.fresh();
-        let taxel = |(fixed, session)| Taxel { gain: fixed * session, presses, loaded: false };
-        self.taxels = self.fixed.iter().zip(gains).map(taxel).collect();
-        self.plays.fill(0.0);
-        self.slow.fill(0.0);
+        self.gains = self.fixed.iter().zip(gains).map(|(fixed, session)| fixed * session).collect();
+        self.places.fill(0);
+        self.loaded.clear();
+        self.plays.clear();
+        self.slow.clear();
+        self.conducting.clear();
+        self.known = true;
+        self.time_s = 0.0;
     }
 }
 
