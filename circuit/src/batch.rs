@@ -174,18 +174,20 @@ impl Batch<'_> {
 
     /// Adds Σₖ (`means`ₖ + `halves`ₖ·wₖ)·xₖ, of sound cells, to the output. Not for analog weights.
     pub(crate) fn add_errors(&mut self, means: &[f64], halves: &[f64], scratch: &mut Scratch) {
+        let skin = self.skin;
         let times = |values: &[f64], out: &mut Vec<f64>| {
-            out.clear();
-            out.extend(values.iter().zip(halves).map(|(x, half)| x * half));
+            // outside the fours nobody looks
+            out.resize(values.len(), 0.0);
+            skin.places().for_each(|k| out[k] = values[k] * halves[k]);
         };
-        times(self.skin.from, &mut scratch.from);
-        let to = self.skin.to.map(|to| {
+        times(skin.from, &mut scratch.from);
+        let to = skin.to.map(|to| {
             times(to, &mut scratch.to);
             &scratch.to[..]
         });
-        let lines = Lines { from: &scratch.from, to, share: self.skin.share };
+        let lines = Lines { from: &scratch.from, to, ..skin };
         self.rows.sum(lines, &mut scratch.sums);
-        let total = |values: &[f64]| values.iter().zip(means).map(|(x, mean)| x * mean).sum();
+        let total = |values: &[f64]| skin.places().map(|k| values[k] * means[k]).sum();
         let (from, to) = (total(self.skin.from), self.skin.to.map(total));
         for (i, output_v) in self.output_v.iter_mut().enumerate() {
             let error = lines.between(i, from, || to) + self.rows.weighted(&lines, &scratch.sums, i);

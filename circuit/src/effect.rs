@@ -21,6 +21,9 @@ pub struct EffectSession {
     pub feedback_ohm: f64,
     /// Measurements a second, Hz.
     pub sample_rate_hz: f64,
+    /// Whether what a cell does is drawn from streams of its own: where few of many taxels conduct, the others then cost
+    /// nothing.
+    pub cells_apart: bool,
 }
 
 impl EffectSession {
@@ -42,6 +45,7 @@ impl EffectSession {
             weights,
             feedback_ohm: 1e3,
             sample_rate_hz: 1e3,
+            cells_apart: false,
         }
     }
 }

@@ -125,7 +125,8 @@ impl Engine {
     /// The batch before any effect.
     fn sum<'a>(&'a mut self, segment: &Segment<'a>, moments: &Moments, output_v: &'a mut [f64]) -> Batch<'a> {
         let len = output_v.len();
-        let skin = Lines { from: segment.conductance_s, to: segment.end_conductance_s, share: &self.share };
+        let (from, to, fours) = (segment.conductance_s, segment.end_conductance_s, segment.fours);
+        let skin = Lines { from, to, share: &self.share, fours };
         let mode = self.rows.weights().mode();
         self.rows.sum(skin, &mut self.sums);
         self.sum_v.resize(len, 0.0);
@@ -174,13 +175,23 @@ impl Moments {
         let from = segment.conductance_s;
         let to = segment.end_conductance_s.unwrap_or(from);
         let mut lanes = [[0.0; LANES]; 5];
-        for (a, b) in from.chunks(LANES).zip(to.chunks(LANES)) {
-            for (l, (a, b)) in a.iter().zip(b).enumerate() {
-                lanes[0][l] += a;
-                lanes[1][l] += b;
-                lanes[2][l] += a * a;
-                lanes[3][l] += a * b;
-                lanes[4][l] += b * b;
+        let mut add = |l: usize, a: f64, b: f64| {
+            lanes[0][l] += a;
+            lanes[1][l] += b;
+            lanes[2][l] += a * a;
+            lanes[3][l] += a * b;
+            lanes[4][l] += b * b;
+        };
+        match segment.fours {
+            None => {
+                for (a, b) in from.chunks(LANES).zip(to.chunks(LANES)) {
+                    a.iter().zip(b).enumerate().for_each(|(l, (a, b))| add(l, *a, *b));
+                }
+            }
+            // the same sums: what is left out is zero
+            Some(fours) => {
+                let taxels = fours.iter().flat_map(|four| 4 * *four as usize..4 * *four as usize + 4);
+                taxels.take_while(|k| *k < from.len()).for_each(|k| add(k % LANES, from[k], to[k]));
             }
         }
         let [from, to, from_from, from_to, to_to] = lanes.map(|l| l.iter().sum());

@@ -144,6 +144,7 @@ impl Profile {
             let session = EffectSession {
                 feedback_ohm: self.feedback_ohm,
                 sample_rate_hz: self.sample_rate_hz,
+                cells_apart: true,
                 ..EffectSession::of(0, self.weights(mode, taxels)?)
             };
             self.effects(mode, &session)?;

@@ -59,11 +59,38 @@ impl Readout {
         device: Streams,
         session: u64,
     ) -> Result<Self, Refusal> {
+        Self::of_cells(profile, mode, layout, device, session, false)
+    }
+
+    /// [`Readout::new`] for sources in which few taxels conduct at a time ([`Segment::fours`](crate::Segment::fours)).
+    /// With more than 1,024 taxels, what a cell does is drawn from streams of its own, so that its noise is another than
+    /// that of [`Readout::new`].
+    ///
+    /// # Errors
+    /// As [`Readout::new`].
+    pub fn of_touches(
+        profile: &Profile,
+        mode: Mode,
+        layout: &SkinLayout,
+        device: Streams,
+        session: u64,
+    ) -> Result<Self, Refusal> {
+        Self::of_cells(profile, mode, layout, device, session, layout.taxels() > 1024)
+    }
+
+    fn of_cells(
+        profile: &Profile,
+        mode: Mode,
+        layout: &SkinLayout,
+        device: Streams,
+        session: u64,
+        apart: bool,
+    ) -> Result<Self, Refusal> {
         let taxels = u32::try_from(layout.taxels()).unwrap_or(u32::MAX);
         let profile = &profile.on(layout)?;
         profile.validate(taxels)?;
         let weights = profile.weights(mode, taxels)?.wired(Wires::new(&profile.wires, layout)?)?;
-        let lines = (0..weights.wire_count()).map(|wire| Line::new(profile, &weights, wire, device, session));
+        let lines = (0..weights.wire_count()).map(|wire| Line::new(profile, &weights, wire, device, session, apart));
         let lines: Vec<Line> = lines.collect::<Result<_, _>>()?;
         let rates_hz = lines.iter().map(|line| line.engine.sample_rate_hz());
         let info = RecordingInfo {
@@ -258,7 +285,14 @@ impl Readout {
 impl Line {
     /// Wire number `wire` of a skin with these `weights` and this `profile`, which is scaled for it. A wire with fewer
     /// taxels than another takes as long for a raster scan.
-    fn new(profile: &Profile, weights: &Weights, wire: usize, device: Streams, session: u64) -> Result<Self, Refusal> {
+    fn new(
+        profile: &Profile,
+        weights: &Weights,
+        wire: usize,
+        device: Streams,
+        session: u64,
+        cells_apart: bool,
+    ) -> Result<Self, Refusal> {
         let (mode, own) = (weights.mode().readout(), weights.of_wire(wire));
         let label = match mode {
             Mode::Raster => "readout/raster",
@@ -284,6 +318,7 @@ impl Line {
             weights: own.clone(),
             feedback_ohm: profile.feedback_ohm,
             sample_rate_hz,
+            cells_apart,
         };
         let effects = profile.effects(mode, &session)?;
         let engine = Engine::new(own, profile.volts_per_siemens(), sample_rate_hz);
@@ -315,7 +350,7 @@ impl ConductanceSource for OnWire<'_> {
             own(all, &mut self.to_s);
             &self.to_s[..]
         });
-        Segment { conductance_s: &self.from_s, end_conductance_s, ..segment }
+        Segment { conductance_s: &self.from_s, end_conductance_s, fours: None, ..segment }
     }
 }
 
@@ -356,9 +391,8 @@ mod tests {
         }
     }
 
-    /// All effects and faults together, with the generator's levels and with others.
-    #[test]
-    fn the_cut_into_batches_does_not_show() {
+    /// Profiles with all effects and faults: as built, without a converter, and that with eight bits.
+    fn with_everything() -> [Profile; 3] {
         let mut profile = Profile::named("as_built").unwrap();
         let faults = "[[faults]]\nname = \"mis_seeded\"\ntaxel = 3\n[[faults]]\nname = \"drifting\"\ntaxel = 4\n\
                       [[faults]]\nname = \"skipping_clocks\"\ntaxel = 5\nprobability = 0.01\n";
@@ -381,10 +415,38 @@ mod tests {
             analog.compressive.remove(name);
             analog.raster.remove(name);
         }
-        let mut eight_bits = analog.clone();
-        eight_bits.weights = crate::CompressiveWeights::Analog;
-        let profiles = [&profile, &analog, &eight_bits].into_iter();
-        let cases = profiles.flat_map(|p| [(p, Mode::Raster), (p, Mode::Compressive)]);
+        let eight_bits = Profile { weights: crate::CompressiveWeights::Analog, ..analog.clone() };
+        [profile, analog, eight_bits]
+    }
+
+    /// What is said of the taxels that conduct saves time and changes no bit.
+    #[test]
+    fn taxels_that_conduct_nothing_add_nothing() {
+        for profile in &with_everything() {
+            for mode in [Mode::Raster, Mode::Compressive] {
+                let conducting = [3_usize, 4, 5, 41, 97];
+                let mut readouts =
+                    [0; 2].map(|_| Readout::new(profile, mode, &SkinLayout::default(), Streams::new(8), 0).unwrap());
+                let mut some = crate::Constant::new(ConductanceMap::zeros(10, 10)).unwrap();
+                for k in 0..3_u32 {
+                    let values = conducting.map(|taxel| (taxel, 1e-5 * f64::from(k * (taxel as u32 % 7))));
+                    some.change(values, conducting.map(|taxel| taxel as u32)).unwrap();
+                    let mut all = crate::Constant::new(some.map().clone()).unwrap();
+                    let sources: [&mut dyn ConductanceSource; 2] = [&mut some, &mut all];
+                    let mut found = readouts.iter_mut().zip(sources).map(|(readout, source)| {
+                        readout.measure(source, 600).unwrap().into_iter().map(f64::to_bits).collect::<Vec<_>>()
+                    });
+                    assert!(found.next() == found.next(), "{mode:?}, step {k}");
+                }
+            }
+        }
+    }
+
+    /// All effects and faults together, with the generator's levels and with others.
+    #[test]
+    fn the_cut_into_batches_does_not_show() {
+        let profiles = with_everything();
+        let cases = profiles.iter().flat_map(|p| [(p, Mode::Raster), (p, Mode::Compressive)]);
         for (profile, mode, in_order) in cases.flat_map(|(p, mode)| [(p, mode, true), (p, mode, false)]) {
             let volts = |batch: usize| {
                 let mut readout = Readout::new(profile, mode, &SkinLayout::default(), Streams::new(8), 0).unwrap();

@@ -17,6 +17,8 @@ pub struct Segment<'a> {
     pub conductance_s: &'a [f64],
     /// Conductance of every taxel at the end, S, in the same range; `None` if it is constant.
     pub end_conductance_s: Option<&'a [f64]>,
+    /// Fours of taxels, k for 4k to 4k + 3, outside which nothing conducts, in order; `None`: any taxel may.
+    pub fours: Option<&'a [u32]>,
 }
 
 impl Segment<'_> {
@@ -27,7 +29,8 @@ impl Segment<'_> {
             None => true,
             Some(values) => len(values) && self.start_s <= time_s && self.end_s.is_finite(),
         };
-        if len(self.conductance_s) && held && time_s < self.end_s {
+        let there = self.fours.and_then(|fours| fours.last()).is_none_or(|last| 4 * (*last as usize) < taxels);
+        if len(self.conductance_s) && held && there && time_s < self.end_s {
             return Ok(());
         }
         let (taxels, start_s, end_s) = (self.conductance_s.len(), self.start_s, self.end_s);
@@ -55,7 +58,8 @@ impl Segment<'_> {
 ///         let start_s = time_s.floor();
 ///         self.start = [1e-5 * start_s; 4];
 ///         self.end = [1e-5 * (start_s + 1.0); 4];
-///         Segment { start_s, end_s: start_s + 1.0, conductance_s: &self.start, end_conductance_s: Some(&self.end) }
+///         let (conductance_s, end_conductance_s) = (&self.start[..], Some(&self.end[..]));
+///         Segment { start_s, end_s: start_s + 1.0, conductance_s, end_conductance_s, fours: None }
 ///     }
 /// }
 /// let mut rising = Rising { start: [0.0; 4], end: [0.0; 4] };
@@ -81,20 +85,22 @@ fn check(index: usize, map: &ConductanceMap, expected: usize) -> Result<(), Refu
         let taxels = values.len();
         return Err(Refusal::new(format!("map {index} has {taxels} taxels; expected {expected}")));
     }
-    match values.iter().position(|g| !(0.0..=MAX_CONDUCTANCE_S).contains(g)) {
-        None => Ok(()),
-        Some(taxel) => {
-            let value_s = values[taxel];
-            let place = format!("map {index}, taxel {taxel}");
-            Err(Refusal::new(format!("{place} has conductance {value_s} S, outside [0, 1e12]")))
-        }
+    values.iter().enumerate().try_for_each(|(taxel, value_s)| check_value(index, taxel, *value_s))
+}
+
+fn check_value(index: usize, taxel: usize, value_s: f64) -> Result<(), Refusal> {
+    if (0.0..=MAX_CONDUCTANCE_S).contains(&value_s) {
+        return Ok(());
     }
+    Err(Refusal::new(format!("map {index}, taxel {taxel} has conductance {value_s} S, outside [0, 1e12]")))
 }
 
 /// A conductance that is constant in time.
 #[derive(Debug, Clone)]
 pub struct Constant {
     map: ConductanceMap,
+    /// As of [`Segment::fours`].
+    fours: Option<Vec<u32>>,
 }
 
 impl Constant {
@@ -107,7 +113,44 @@ impl Constant {
             return Err(empty());
         }
         check(0, &map, map.values().len())?;
-        Ok(Self { map })
+        Ok(Self { map, fours: None })
+    }
+
+    /// Changes the conductance of some taxels, S, and takes those for `conducting`, in order, that are not zero then:
+    /// what is summed is a matter of these alone.
+    ///
+    /// ```
+    /// use spts_circuit::Constant;
+    /// use spts_models::ConductanceMap;
+    ///
+    /// let mut skin = Constant::new(ConductanceMap::zeros(1000, 1000))?;
+    /// skin.change([(77, 1e-4), (500_000, 2e-4)], [77, 500_000])?;
+    /// assert_eq!(skin.values()[77], 1e-4);
+    /// # Ok::<(), spts_input::Refusal>(())
+    /// ```
+    ///
+    /// # Errors
+    /// [`Refusal`] for a conductance outside [0, 1e12] S.
+    ///
+    /// # Panics
+    /// If there is no such taxel.
+    pub fn change(
+        &mut self,
+        values: impl IntoIterator<Item = (usize, f64)>,
+        conducting: impl IntoIterator<Item = u32>,
+    ) -> Result<(), Refusal> {
+        for (taxel, value_s) in values {
+            check_value(0, taxel, value_s)?;
+            self.map.values_mut()[taxel] = value_s;
+        }
+        let fours = self.fours.get_or_insert_default();
+        fours.clear();
+        for four in conducting.into_iter().map(|taxel| taxel / 4) {
+            if fours.last() != Some(&four) {
+                fours.push(four);
+            }
+        }
+        Ok(())
     }
 
     /// Conductance of every taxel, S.
@@ -127,13 +170,13 @@ impl ConductanceSource for Constant {
     }
 
     fn segment(&mut self, _time_s: f64) -> Segment<'_> {
-        held(f64::INFINITY, &self.map)
+        Segment { fours: self.fours.as_deref(), ..held(f64::INFINITY, &self.map) }
     }
 }
 
 /// `map` up to `end_s`.
 fn held(end_s: f64, map: &ConductanceMap) -> Segment<'_> {
-    Segment { start_s: 0.0, end_s, conductance_s: map.values(), end_conductance_s: None }
+    Segment { start_s: 0.0, end_s, conductance_s: map.values(), end_conductance_s: None, fours: None }
 }
 
 /// Maps at given times with linear interpolation; constant before the first and after the last map.
@@ -255,6 +298,7 @@ impl ConductanceSource for Interpolated {
             end_s: self.times_s[k + 1],
             conductance_s: self.maps[k].values(),
             end_conductance_s: Some(self.maps[k + 1].values()),
+            fours: None,
         }
     }
 }

@@ -474,7 +474,8 @@ impl Skin {
             state.touches += 1;
             state.time_s += dt;
             let [means, electrodes] = [state.skin.pressure(), state.skin.electrode_pressure()];
-            let of = |k: &usize| (*k, [means.values()[*k], electrodes.values()[*k]]);
+            #[expect(clippy::cast_possible_truncation, reason = "a layout has fewer than 2^32 taxels")]
+            let of = |k: &usize| (*k as u32, [means.values()[*k], electrodes.values()[*k]]);
             let felt =
                 Pressures { shape: [means.rows(), means.cols()], pa: state.skin.touched().iter().map(of).collect() };
             let scalars = [state.skin.touched_m2(), state.time_s];
@@ -574,29 +575,29 @@ pub(crate) struct Pressures {
     /// Rows and columns.
     shape: [usize; 2],
     /// Taxels that may have a pressure, in their order: number, and mean pressure over its area and its electrode, Pa.
-    pa: Vec<(usize, [f64; 2])>,
+    pa: Vec<(u32, [f64; 2])>,
 }
 
 impl Pressures {
     /// Pressures over areas and electrodes, row by row.
     fn of(shape: [usize; 2], means: &[f64], electrodes: &[f64]) -> Self {
-        let all = means.iter().zip(electrodes).map(|(p, electrode)| [*p, *electrode]).enumerate();
+        let all = (0..).zip(means.iter().zip(electrodes).map(|(p, electrode)| [*p, *electrode]));
         Self { shape, pa: all.filter(|(_, pa)| pa.iter().any(|p| *p != 0.0)).collect() }
     }
 
     /// Mean pressures over the areas of all taxels.
     fn means(&self) -> Vec<f64> {
-        self.all(0)
+        self.all(self.pa.iter().map(|(k, pa)| (*k, pa[0])))
     }
 
-    /// Mean pressures over the electrodes of all taxels: what the transducer feels.
-    pub(crate) fn electrodes(&self) -> Vec<f64> {
-        self.all(1)
+    /// Mean pressures over the electrodes of these taxels: what the transducer feels.
+    pub(crate) fn electrodes(&self) -> impl Iterator<Item = (u32, f64)> {
+        self.pa.iter().map(|(k, pa)| (*k, pa[1]))
     }
 
-    fn all(&self, which: usize) -> Vec<f64> {
+    fn all(&self, of: impl Iterator<Item = (u32, f64)>) -> Vec<f64> {
         let mut all = vec![0.0; self.shape[0] * self.shape[1]];
-        self.pa.iter().for_each(|(k, pa)| all[*k] = pa[which]);
+        of.for_each(|(k, pa)| all[k as usize] = pa);
         all
     }
 }
@@ -693,7 +694,7 @@ impl Touch {
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
         let (py, touch) = (slf.py(), slf.get());
-        let felt = touch.felt.electrodes().into_pyarray(py);
+        let felt = touch.felt.all(touch.felt.electrodes()).into_pyarray(py);
         let scalars = (touch.area, touch.time, touch.number, touch.bottomed, touch.skin);
         let arguments = (touch.pressure(py)?, touch.wrenches(py)?, felt, scalars).into_pyobject(py)?;
         Ok((slf.get_type().getattr("_restored")?, arguments))

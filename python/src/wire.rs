@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 use spts::chain::{RowsConfig, SkinSession};
 use spts::circuit::{CompressiveWeights, Patterns, Profile, Seeding, WeightMode};
 use spts::models::{Snapshot, Streams};
-use spts::{Chain, ChainConfig, Mode, PressureMap, SkinLayout, Wire as Line};
+use spts::{Chain, ChainConfig, Mode, SkinLayout, Wire as Line};
 use std::path::Path;
 use std::sync::{Mutex, PoisonError};
 
@@ -77,7 +77,8 @@ struct State {
 
 /// What was felt last of a skin.
 struct Felt {
-    pressure: PressureMap,
+    /// Taxels that were pressed, in order, and their pressure, Pa.
+    pressed: Vec<(u32, f64)>,
     /// Time of the touch, s, and its number.
     time_s: f64,
     number: u64,
@@ -103,10 +104,10 @@ struct Made {
 struct Part {
     /// Which skin, by the bits of its number.
     id: i64,
-    /// Taxels of the skin, in the order of their places; `None` for all of them.
-    taxels: Option<Vec<usize>>,
+    /// Taxels of the skin, in order, with their number here; `None` for all of them.
+    taxels: Option<Vec<(u32, u32)>>,
     /// Their places on the wire.
-    places: Vec<usize>,
+    places: Vec<u32>,
     layout: SkinLayout,
 }
 
@@ -331,10 +332,31 @@ impl Made {
     }
 }
 
+impl Part {
+    /// The pressed taxels of a touch, by their place in the part, in order, and the pressure on their electrodes, Pa.
+    fn pressed(&self, touch: &Touch) -> Vec<(u32, f64)> {
+        let pressed = touch.felt.electrodes().filter(|(_, pa)| *pa > 0.0);
+        let Some(taxels) = &self.taxels else {
+            return pressed.collect();
+        };
+        let place = |(taxel, pa): (u32, f64)| {
+            let at = taxels.binary_search_by_key(&taxel, |(taxel, _)| *taxel).ok()?;
+            Some((taxels[at].1, pa))
+        };
+        let mut own: Vec<(u32, f64)> = pressed.filter_map(place).collect();
+        own.sort_unstable_by_key(|(place, _)| *place);
+        own
+    }
+}
+
 impl State {
     fn exchange(&mut self, state: &mut Snapshot) -> Result<(), spts::Refusal> {
         for felt in &mut self.skins {
-            state.f64s(felt.pressure.values_mut());
+            let (mut taxels, mut values): (Vec<u32>, Vec<f64>) = felt.pressed.iter().copied().unzip();
+            state.u32s(&mut taxels);
+            values.resize(taxels.len(), 0.0);
+            state.f64s(&mut values);
+            felt.pressed = taxels.into_iter().zip(values).collect();
             state.f64(&mut felt.time_s);
             state.u64(&mut felt.number);
         }
@@ -359,13 +381,9 @@ impl Wire {
             });
             Line::over(skins.collect::<Result<_, _>>()?, chain, session)
         });
-        let felt = |part: &Part| Felt {
-            pressure: PressureMap::zeros(part.layout.rows(), part.layout.cols()),
-            time_s: 0.0,
-            number: 0,
-        };
+        let felt = made.skins.iter().map(|_| Felt { pressed: Vec::new(), time_s: 0.0, number: 0 });
         Ok(Self {
-            state: Mutex::new(State { line: line.map_err(refuse)?, skins: made.skins.iter().map(felt).collect() }),
+            state: Mutex::new(State { line: line.map_err(refuse)?, skins: felt.collect() }),
             shape: (made.skin.rows(), made.skin.cols()),
             sample_rate: chain.sample_rate_hz(),
             made,
@@ -458,15 +476,10 @@ impl Wire {
                     last.time_s
                 );
             }
-            let felt = touch.felt.electrodes();
-            let felt = match &part.taxels {
-                Some(taxels) => taxels.iter().map(|taxel| felt[*taxel]).collect(),
-                None => felt,
-            };
-            let pressure = PressureMap::from_values(part.layout.rows(), part.layout.cols(), felt);
+            let pressed = part.pressed(touch);
             if touch.number > last.number {
-                news.push(Some((pressure, dt_s, touch)));
-            } else if dt_s > 0.0 || pressure != last.pressure {
+                news.push(Some((pressed, dt_s, touch)));
+            } else if dt_s > 0.0 || pressed != last.pressed {
                 bail!(
                     "{name} is of a copy of the skin: this wire has felt another touch of the number {}",
                     touch.number
@@ -475,13 +488,14 @@ impl Wire {
                 news.push(None);
             }
         }
-        let each: Vec<_> = news.iter().map(|new| new.as_ref().map(|(pressure, dt_s, _)| (pressure, *dt_s))).collect();
+        let each = news.iter().map(|new| new.as_ref().map(|(pressed, dt_s, _)| (&pressed[..], *dt_s)));
+        let each: Vec<_> = each.collect();
         if each.iter().any(Option::is_some) {
-            state.line.feel_each(&each).map_err(refuse)?;
+            state.line.feel_touched(&each).map_err(refuse)?;
         }
         for (last, new) in state.skins.iter_mut().zip(news) {
-            if let Some((pressure, _, touch)) = new {
-                *last = Felt { pressure, time_s: touch.time, number: touch.number };
+            if let Some((pressed, _, touch)) = new {
+                *last = Felt { pressed, time_s: touch.time, number: touch.number };
             }
         }
         Ok(())
@@ -522,14 +536,14 @@ fn parts(several: bool, skins: &[Bound<'_, Skin>], taxels: Option<Vec<usize>>) -
     let layouts: Vec<SkinLayout> = skins.iter().map(|skin| skin.get().layout()).collect();
     let id = |k: usize| skins[k].get().id().cast_signed();
     if !several && taxels.is_none() {
-        let places = (0..layouts[0].taxels()).collect();
+        let places = (0..).take(layouts[0].taxels()).collect();
         return Ok((layouts[0], vec![Part { id: id(0), taxels: None, places, layout: layouts[0] }]));
     }
     // the skin of every taxel, and its number there
     let all: Vec<(usize, usize)> =
         layouts.iter().enumerate().flat_map(|(k, layout)| (0..layout.taxels()).map(move |taxel| (k, taxel))).collect();
     let mut seen = vec![false; all.len()];
-    let mut on_wire: Vec<(Vec<usize>, Vec<usize>)> = vec![(Vec::new(), Vec::new()); skins.len()];
+    let mut on_wire: Vec<(Vec<(u32, u32)>, Vec<u32>)> = vec![(Vec::new(), Vec::new()); skins.len()];
     for (place, taxel) in taxels.unwrap_or_else(|| (0..all.len()).collect()).into_iter().enumerate() {
         match seen.get_mut(taxel) {
             None => bail!("`taxels[{place}]` = {taxel} is outside [0, {}]", all.len() - 1),
@@ -537,11 +551,13 @@ fn parts(several: bool, skins: &[Bound<'_, Skin>], taxels: Option<Vec<usize>>) -
             Some(seen) => *seen = true,
         }
         let (skin, taxel) = all[taxel];
-        on_wire[skin].0.push(taxel);
-        on_wire[skin].1.push(place);
+        let (taxels, places) = &mut on_wire[skin];
+        taxels.push((whole("taxels", taxel as i128)?, whole("taxels", taxels.len() as i128)?));
+        places.push(whole("taxels", place as i128)?);
     }
     let mut parts = Vec::with_capacity(skins.len());
-    for (k, (taxels, places)) in on_wire.into_iter().enumerate() {
+    for (k, (mut taxels, places)) in on_wire.into_iter().enumerate() {
+        taxels.sort_unstable();
         if several && taxels.is_empty() {
             bail!("`taxels` has none of skin {k}: leave it out of `skin`");
         }

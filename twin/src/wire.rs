@@ -26,10 +26,21 @@ const IDLE: usize = 2000;
 /// # Ok::<(), spts::Refusal>(())
 /// ```
 pub struct Wire {
-    skins: Vec<(SkinSession, Vec<usize>)>,
+    skins: Vec<Worn>,
     felt: Constant,
+    /// Scratch: places that conduct.
+    conducting: Vec<u32>,
     /// Compressive, then raster.
     lines: Vec<Line>,
+}
+
+/// A skin on the wire.
+struct Worn {
+    skin: SkinSession,
+    /// Place on the wire of each of its taxels.
+    places: Vec<u32>,
+    /// Taxels that conduct, and some that did before the last touch: number and conductance, S.
+    conductance_s: Vec<(u32, f64)>,
 }
 
 /// The readout in one mode.
@@ -44,7 +55,7 @@ impl Wire {
     /// # Errors
     /// [`Refusal`] if the source of the weights cannot provide them.
     pub fn new(chain: &Chain, session: u64) -> Result<Self, Refusal> {
-        let taxels = (0..chain.skin().taxels()).collect();
+        let taxels = (0..).take(chain.skin().taxels()).collect();
         Self::over(vec![(chain.skin_session(session), taxels)], chain, session)
     }
 
@@ -56,21 +67,22 @@ impl Wire {
     ///
     /// # Panics
     /// If the places are not all those of the layout.
-    pub fn over(skins: Vec<(SkinSession, Vec<usize>)>, chain: &Chain, session: u64) -> Result<Self, Refusal> {
+    pub fn over(skins: Vec<(SkinSession, Vec<u32>)>, chain: &Chain, session: u64) -> Result<Self, Refusal> {
         let layout = chain.skin();
         if chain.wires() > 1 {
             let wires = chain.wires();
             return Err(Refusal::new(format!("`wires`: the skin has {wires}; what is read live is one wire")));
         }
         let bare = ConductanceMap::zeros(layout.rows(), layout.cols());
-        let mut wire = Self { skins, felt: Constant::new(bare).map_err(of_conductance)?, lines: Vec::new() };
-        let zeros = wire.skins.iter().map(|(skin, _)| PressureMap::zeros(skin.shape()[0], skin.shape()[1]));
-        let zeros: Vec<PressureMap> = zeros.collect();
-        let placed: usize = wire.skins.iter().map(|(_, places)| places.len()).sum();
+        let worn = |(skin, places)| Worn { skin, places, conductance_s: Vec::new() };
+        let skins: Vec<Worn> = skins.into_iter().map(worn).collect();
+        let placed: usize = skins.iter().map(|worn| worn.places.len()).sum();
         assert_eq!(placed, layout.taxels(), "one place a taxel");
-        wire.feel_each(&zeros.iter().map(|zeros| Some((zeros, 0.0))).collect::<Vec<_>>())?;
+        let felt = Constant::new(bare).map_err(of_conductance)?;
+        let mut wire = Self { skins, felt, conducting: Vec::new(), lines: Vec::new() };
+        wire.feel_touched(&vec![Some((&[][..], 0.0)); wire.skins.len()])?;
         for mode in [Mode::Compressive, Mode::Raster] {
-            let mut readout = chain.readout(mode, session)?;
+            let mut readout = chain.readout_of_touches(mode, session)?;
             // whole rounds of a pattern, so that what follows begins with its first row
             let period = readout.weights().patterns().map_or(1, Patterns::period);
             let idle = readout.measure(&mut wire.felt, IDLE.next_multiple_of(period)).map_err(of_readout)?;
@@ -85,33 +97,42 @@ impl Wire {
     /// [`Refusal`] for a conductance that cannot be used.
     ///
     /// # Panics
-    /// If the map has another shape than the skin.
+    /// If the wire is over several skins, or the map has another shape than the skin.
     pub fn feel(&mut self, electrode_pressure: &PressureMap, dt_s: f64) -> Result<(), Refusal> {
-        self.feel_each(&[Some((electrode_pressure, dt_s))])
+        let shape = [electrode_pressure.rows(), electrode_pressure.cols()];
+        assert_eq!(shape, self.skins[0].skin.shape(), "shape of the pressure");
+        let pressed = (0..).zip(electrode_pressure.values().iter().copied()).filter(|(_, pa)| *pa > 0.0);
+        self.feel_touched(&[Some((&pressed.collect::<Vec<_>>(), dt_s))])
     }
 
-    /// [`Wire::feel`] for every skin: its pressure and for how long that is applied, s. `None` leaves the taxels of a
-    /// skin as they are.
+    /// [`Wire::feel`] for every skin: the taxels that are pressed, in order, with their pressure, Pa, and for how long
+    /// that is applied, s. `None` leaves the taxels of a skin as they are. Taxels that are neither pressed nor conduct
+    /// cost nothing.
     ///
     /// # Errors
     /// As [`Wire::feel`].
     ///
     /// # Panics
-    /// If there are more or fewer than skins, or a map has another shape than its skin.
-    pub fn feel_each(&mut self, felt: &[Option<(&PressureMap, f64)>]) -> Result<(), Refusal> {
-        assert_eq!(felt.len(), self.skins.len(), "one pressure a skin");
-        let mut conductance = self.felt.map().clone();
-        for ((skin, places), felt) in self.skins.iter_mut().zip(felt) {
-            let Some((pressure, dt_s)) = felt else {
-                continue;
-            };
-            assert_eq!([pressure.rows(), pressure.cols()], skin.shape(), "shape of the pressure");
-            for (place, g) in places.iter().zip(skin.hold(pressure, *dt_s).values()) {
-                conductance.values_mut()[*place] = *g;
+    /// If there are more or fewer than skins, or a skin does not have one of the taxels.
+    pub fn feel_touched(&mut self, felt: &[Option<(&[(u32, f64)], f64)>]) -> Result<(), Refusal> {
+        assert_eq!(felt.len(), self.skins.len(), "one touch a skin");
+        for (worn, felt) in self.skins.iter_mut().zip(felt) {
+            if let Some((pressed, dt_s)) = felt {
+                worn.skin.hold_touched(pressed, *dt_s, &mut worn.conductance_s);
             }
         }
-        self.felt = Constant::new(conductance).map_err(of_conductance)?;
-        Ok(())
+        self.conduct()
+    }
+
+    /// Gives the wire the conductance of its skins.
+    fn conduct(&mut self) -> Result<(), Refusal> {
+        let placed =
+            self.skins.iter().flat_map(|worn| worn.conductance_s.iter().map(|(k, g)| (worn.places[*k as usize], *g)));
+        self.conducting.clear();
+        self.conducting.extend(placed.clone().filter(|(_, g)| *g > 0.0).map(|(place, _)| place));
+        self.conducting.sort_unstable();
+        let values = placed.map(|(place, g)| (place as usize, g));
+        self.felt.change(values, self.conducting.iter().copied()).map_err(of_conductance)
     }
 
     /// Saves or loads everything that it remembers, for a wire that was made with the same arguments.
@@ -119,12 +140,16 @@ impl Wire {
     /// # Errors
     /// [`Refusal`] for a conductance that cannot be.
     pub fn exchange(&mut self, state: &mut Snapshot) -> Result<(), Refusal> {
-        for (skin, _) in &mut self.skins {
-            skin.exchange(state);
+        for worn in &mut self.skins {
+            worn.skin.exchange(state);
+            let (mut taxels, mut values): (Vec<u32>, Vec<f64>) = worn.conductance_s.iter().copied().unzip();
+            state.u32s(&mut taxels);
+            values.resize(taxels.len(), 0.0);
+            state.f64s(&mut values);
+            worn.conductance_s =
+                taxels.into_iter().zip(values).filter(|(k, _)| (*k as usize) < worn.places.len()).collect();
         }
-        let mut conductance = self.felt.map().clone();
-        state.f64s(conductance.values_mut());
-        self.felt = Constant::new(conductance).map_err(of_conductance)?;
+        self.conduct()?;
         for line in &mut self.lines {
             line.readout.exchange(state);
         }
@@ -222,13 +247,14 @@ mod tests {
         let chain = Chain::new(&config, &all, 3, ".".as_ref()).unwrap();
         let skin = |seed| SkinSession::new(&config, &small, Streams::new(seed), 0).unwrap();
         let make = || {
-            let places = |first: usize| (0..6).map(|k| 2 * k + first).collect();
+            let places = |first: u32| (0..6).map(|k| 2 * k + first).collect();
             Wire::over(vec![(skin(3), places(0)), (skin(4), places(1))], &chain, 0).unwrap()
         };
         let pressure = PressureMap::from_values(2, 3, vec![2e4, 0.0, 1e4, 3e4, 0.0, 5e3]);
         let mut wire = make();
-        wire.feel_each(&[Some((&pressure, 0.1)), None]).unwrap();
-        wire.feel_each(&[None, Some((&pressure, 0.2))]).unwrap();
+        let pressed: Vec<(u32, f64)> = (0..).zip(pressure.values().iter().copied()).collect();
+        wire.feel_touched(&[Some((&pressed, 0.1)), None]).unwrap();
+        wire.feel_touched(&[None, Some((&pressed, 0.2))]).unwrap();
         for (seed, dt_s) in [(3, 0.1), (4, 0.2)] {
             let alone = skin(seed).hold(&pressure, dt_s);
             let own = wire.conductance_s().iter().skip(usize::from(seed == 4)).step_by(2);
@@ -241,7 +267,7 @@ mod tests {
         copy.exchange(&mut loading).unwrap();
         loading.finish().unwrap();
         for wire in [&mut wire, &mut copy] {
-            wire.feel_each(&[Some((&pressure, 0.7)), None]).unwrap();
+            wire.feel_touched(&[Some((&pressed, 0.7)), None]).unwrap();
         }
         for mode in [Mode::Compressive, Mode::Raster] {
             let [goes_on, same] = [&mut wire, &mut copy].map(|wire| {

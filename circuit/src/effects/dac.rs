@@ -121,7 +121,7 @@ impl Dac {
 
     /// Every level on its own.
     fn add_each(&self, batch: &mut Batch<'_>) {
-        for k in 0..self.converters.len() {
+        for k in batch.skin.places() {
             let cell = batch.cells.get(k);
             for (i, output_v) in batch.output_v.iter_mut().enumerate() {
                 let (level, gain) =
@@ -135,7 +135,7 @@ impl Dac {
     /// The levels that the mode does not have, of cells whose codes come from outside.
     fn add_odd(&self, batch: &mut Batch<'_>) {
         for i in batch.rows.odd() {
-            for k in 0..self.converters.len() {
+            for k in batch.skin.places() {
                 let level = batch.rows.level(k, i);
                 let replaced = batch.cells.get(k).is_some_and(|cell| cell.differs(i, level));
                 if !replaced {

@@ -10,7 +10,7 @@ use serde::Deserialize;
 use spts_input::Refusal;
 use spts_models::{Snapshot, Streams, in_range, within};
 use std::cmp::Reverse;
-use std::collections::BinaryHeap;
+use std::collections::{BinaryHeap, HashMap};
 
 /// Each cell's millisecond timer beats against the common clock: every `period_measurements` its interrupt collides
 /// with an edge and may delay the update past the moment of sampling. The output then errs by (previous − new
@@ -43,6 +43,14 @@ struct Cell {
 }
 
 impl Cell {
+    /// The cell with the oscillator and the probability that are drawn by these generators.
+    fn drawn(config: &Config, oscillators: &mut ChaCha8Rng, cells: &mut ChaCha8Rng) -> Self {
+        let normal: f64 = StandardNormal.sample(oscillators);
+        let period = config.period_measurements + config.period_sd_measurements * normal.clamp(-4.0, 4.0);
+        let phase = period * cells.random::<f64>();
+        Self { phase, period, late: 0.0, ln_in_time: 0.0, collision: 0.0 }.late_at(config.rate.draw(cells) * period)
+    }
+
     /// The same with this probability that a collision makes it late.
     fn late_at(self, late: f64) -> Self {
         Self { late, ln_in_time: (-late).ln_1p(), ..self }
@@ -106,17 +114,15 @@ pub(super) fn build(table: toml::Table, session: &EffectSession) -> Result<Box<d
     in_range("period_measurements", period, (2.0..1e9).contains(&period), "[2, 1e9)")?;
     let sd = config.period_sd_measurements;
     within("period_sd_measurements", sd, 0.0, 0.1 * period, "[0, period_measurements/10]")?;
-    let rate = config.rate.within("rate", 0.0, 0.5 / period, "[0, 0.5/period_measurements]")?;
+    config.rate.within("rate", 0.0, 0.5 / period, "[0, 0.5/period_measurements]")?;
+    if session.cells_apart {
+        let (device, session) = (session.device, session.streams);
+        return Ok(Box::new(LateCells { config, device, session, block: session, cells: HashMap::new() }));
+    }
     let mut oscillators = session.device.rng("late-updates/oscillators", 0);
     let mut rng = session.streams.rng("late-updates/cells", 0);
-    let cells = (0..session.weights.taxels())
-        .map(|_| {
-            let normal: f64 = StandardNormal.sample(&mut oscillators);
-            let period = period + sd * normal.clamp(-4.0, 4.0);
-            Cell { phase: period * rng.random::<f64>(), period, late: 0.0, ln_in_time: 0.0, collision: 0.0 }
-                .late_at(rate.draw(&mut rng) * period)
-        })
-        .collect();
+    let cells = session.weights.taxels();
+    let cells = (0..cells).map(|_| Cell::drawn(&config, &mut oscillators, &mut rng)).collect();
     if session.weights.mode() == WeightMode::Raster {
         return Ok(Box::new(LateRaster::new(session.streams, cells)));
     }
@@ -220,6 +226,53 @@ impl Effect for LateRaster {
     }
 }
 
+/// The same process where few taxels conduct: a cell is drawn from streams of its own, and only those that conduct are
+/// looked at.
+struct LateCells {
+    config: Config,
+    device: Streams,
+    session: Streams,
+    block: Streams,
+    /// Cells that have conducted.
+    cells: HashMap<usize, Cell>,
+}
+
+impl Effect for LateCells {
+    fn begin_block(&mut self, start: &BlockStart) {
+        self.block = self.session.child("late-updates", start.block);
+    }
+
+    fn apply(&mut self, batch: &mut Batch<'_>) {
+        let (first, end) = (batch.row(0), batch.row(batch.len()));
+        for k in batch.skin.places() {
+            let cell = self.cells.entry(k).or_insert_with(|| {
+                let rng = |streams: &Streams, label| streams.rng(label, k as u64);
+                let oscillator = &mut rng(&self.device, "late-updates/oscillator");
+                Cell::drawn(&self.config, oscillator, &mut rng(&self.session, "late-updates/cell"))
+            });
+            let mut collision = cell.first_collision(first);
+            loop {
+                let row = row_of(cell.phase + collision * cell.period);
+                if row >= end {
+                    break;
+                }
+                collision += 1.0;
+                let draw: f64 = self.block.child("row", row).rng("cell", k as u64).random();
+                if draw < cell.late {
+                    #[expect(clippy::cast_possible_truncation, reason = "less than the batch is long")]
+                    let i = (row - first) as usize;
+                    let held = batch.previous_level(k, i) - batch.level(k, i);
+                    batch.output_v[i] += held * batch.taxel_v(k, i);
+                }
+            }
+        }
+    }
+
+    fn exchange(&mut self, state: &mut Snapshot) {
+        state.streams(&mut self.block);
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -277,6 +330,35 @@ mod tests {
     }
 
     /// A raster scan has the same late rows whether all collisions are gone through, or the cells that change alone.
+    /// Cells that are drawn apart are as late as those that are drawn together; with certain ones, at the same rows.
+    #[test]
+    fn cells_apart_are_late_alike() {
+        let parameters = "rate = 0.009\nperiod_measurements = 52.3\nperiod_sd_measurements = 0.2";
+        for mode in [WeightMode::Binary, WeightMode::Analog, WeightMode::Raster] {
+            let weights = Weights::new(mode, Seeding::Mixed, 4);
+            let late = |cells_apart| {
+                let session = EffectSession { cells_apart, ..EffectSession::of(5, weights.clone()) };
+                build(toml::from_str(parameters).unwrap(), &session).unwrap()
+            };
+            let mut nominal = vec![0.0; 10_000];
+            weights.weighted_sums(0, &[1.0, 2.0, 4.0, 8.0], &mut nominal);
+            let errors = |volts: &[f64]| volts.iter().zip(&nominal).filter(|(y, u)| (**y - **u).abs() > 1e-9).count();
+            let [apart, together] = [true, false].map(|apart| errors(&run(&weights, late(apart), 10_000)) as f64);
+            // Poisson counts
+            assert!((apart - together).abs() < 4.0 * (apart + together).sqrt(), "{mode:?}: {apart}, {together}");
+            assert!(run(&weights, late(true), 10_000).len() == 10_000 && apart > 10.0, "{mode:?}: {apart}");
+            let certain = || {
+                let session = EffectSession::of(5, weights.clone());
+                let config = toml::from_str(parameters).unwrap();
+                let cells = always_late().into_iter().enumerate().collect();
+                let (device, session) = (session.device, session.streams);
+                Box::new(LateCells { config, device, session, block: session, cells })
+            };
+            let all = run(&weights, Box::new(any_weights()), 10_000);
+            assert!(all == run(&weights, certain(), 10_000) && all == run(&weights, certain(), 100), "{mode:?}");
+        }
+    }
+
     #[test]
     fn a_raster_scan_needs_the_cells_that_change() {
         let weights = Weights::new(WeightMode::Raster, Seeding::Mixed, 4);

@@ -131,11 +131,13 @@ impl Effect for MissedClocks {
     fn apply(&mut self, batch: &mut Batch<'_>) {
         if self.slips(batch) {
             let mut own = self.cells.iter_mut().peekable();
-            for taxel in (0..).take(self.weights.taxels()) {
-                let cell = own.next_if(|cell| cell.taxel() == taxel as usize);
-                if !batch.decided(taxel as usize) {
+            for taxel in batch.skin.places() {
+                while own.next_if(|cell| cell.taxel() < taxel).is_some() {}
+                let cell = own.next_if(|cell| cell.taxel() == taxel);
+                if !batch.decided(taxel) {
                     let (weights, common) = (&self.weights, &self.common);
-                    batch.change(taxel as usize, false, |run| fill(weights, taxel, common, cell, run));
+                    let own = u32::try_from(taxel).unwrap_or(u32::MAX);
+                    batch.change(taxel, false, |run| fill(weights, own, common, cell, run));
                 }
             }
             return;

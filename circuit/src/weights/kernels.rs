@@ -54,7 +54,7 @@ fn wide_state(multiplier: u64, seed: u64, increment: u64) -> u64 {
 
 /// Taxels `first..first + 4` of `values`, 0 past the end.
 #[inline(always)]
-fn four(values: &[f64], first: usize) -> [f64; 4] {
+fn values_of(values: &[f64], first: usize) -> [f64; 4] {
     std::array::from_fn(|j| values.get(first + j).copied().unwrap_or(0.0))
 }
 
@@ -70,6 +70,15 @@ pub(crate) struct Sums {
     pub(crate) to: Vec<f64>,
     /// 127.5² Σ (wₖ·xₖ)² for analog weights.
     pub(crate) squares: Vec<f64>,
+    pub(crate) gathered: Gathered,
+}
+
+/// Values and seeds of the taxels that may not be zero, in fours.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Gathered {
+    pub(crate) from: Vec<f64>,
+    pub(crate) to: Vec<f64>,
+    pub(crate) seeds: Vec<u32>,
 }
 
 /// Straight lines through two sets of values: x = (1 − share)·`from` + share·`to`.
@@ -81,9 +90,33 @@ pub(crate) struct Lines<'a> {
     pub(crate) to: Option<&'a [f64]>,
     /// Share of every measurement.
     pub(crate) share: &'a [f64],
+    /// Fours outside which all values are zero, in order; `None`: any may be.
+    pub(crate) fours: Option<&'a [u32]>,
 }
 
-impl Lines<'_> {
+impl<'a> Lines<'a> {
+    /// Places of the values that may not be zero, in order.
+    pub(crate) fn places(self) -> impl Iterator<Item = usize> + 'a {
+        let count = self.from.len();
+        let all = self.fours.is_none().then_some(0..count).into_iter().flatten();
+        let of = move |four: &u32| 4 * *four as usize..(4 * *four as usize + 4).min(count);
+        all.chain(self.fours.into_iter().flatten().flat_map(of))
+    }
+
+    /// The values of its fours alone, with their seeds: their sums have the same bits.
+    pub(crate) fn gathered(self, seeds: Seeds<'_>, into: &'a mut Gathered) -> (Self, &'a [u32]) {
+        into.from.clear();
+        into.to.clear();
+        into.seeds.clear();
+        for four in self.fours.into_iter().flatten() {
+            let first = 4 * *four as usize;
+            into.from.extend(values_of(self.from, first));
+            into.to.extend(self.to.into_iter().flat_map(|to| values_of(to, first)));
+            into.seeds.extend((first..first + 4).map(|taxel| seeds.seed(taxel)));
+        }
+        (Self { from: &into.from, to: self.to.map(|_| &into.to[..]), fours: None, ..self }, &into.seeds)
+    }
+
     /// Value `k` at measurement `i`.
     #[inline]
     pub(crate) fn at(&self, k: usize, i: usize) -> f64 {
@@ -261,7 +294,7 @@ fn signed_sums_of<L: Levels, const V: usize>(levels: L, values: [&[f64]; V], sum
     let sums = sums.map(|s| &mut s[..len]);
     for first in (0..values[0].len()).step_by(4) {
         let taxels = levels.four(first);
-        let x = values.map(|values| four(values, first));
+        let x = values.map(|values| values_of(values, first));
         for i in 0..len {
             let signs = levels.signs(taxels, i);
             for v in 0..V {
@@ -279,7 +312,7 @@ fn analog_sums_of<L: Levels>(levels: L, lines: Lines<'_>, sums: &mut [f64], squa
     let (share, sums, squares) = (&lines.share[..len], &mut sums[..len], &mut squares[..len]);
     for first in (0..lines.from.len()).step_by(4) {
         let taxels = levels.four(first);
-        let (from, to) = (four(lines.from, first), four(lines.to.unwrap_or(lines.from), first));
+        let (from, to) = (values_of(lines.from, first), values_of(lines.to.unwrap_or(lines.from), first));
         for i in 0..len {
             let level = levels.analog(taxels, i);
             let [a, b, c, d] = std::array::from_fn(|j| level[j] * ((1.0 - share[i]) * from[j] + share[i] * to[j]));
@@ -366,7 +399,7 @@ mod tests {
             assert_eq!(bits(&c), bits(&a1), "{n} taxels");
 
             let share: Vec<f64> = (0..37).map(|i| f64::from(i) / 37.0).collect();
-            let lines = Lines { from: &from, to: Some(&to), share: &share };
+            let lines = Lines { from: &from, to: Some(&to), share: &share, fours: None };
             let [mut a, mut b, mut a1, mut b1] = [zero(), zero(), zero(), zero()];
             analog_sums(drives, lines, &mut a, &mut b);
             analog_sums_of(levels, lines, &mut a1, &mut b1);

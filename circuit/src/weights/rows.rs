@@ -2,7 +2,7 @@
 //! outside.
 
 use super::kernels::{Drives, Jumps, LANES, Lines, Sums, analog_sums, signed_sums, signed_sums_2};
-use super::lcg::{ANALOG_SCALE, Jump};
+use super::lcg::{ANALOG_SCALE, Jump, Seeds};
 use super::sequence::{FULL_SCALE, NEUTRAL, Patterns, WeightMode, Weights};
 use spts_input::Refusal;
 use std::convert::Infallible;
@@ -369,24 +369,29 @@ impl Rows {
     pub(crate) fn sum(&self, lines: Lines<'_>, sums: &mut Sums) {
         let given = self.given.as_deref();
         let len = given.map_or(self.jumps.len(), CodeRows::padded_len);
-        for sum in [&mut sums.from, &mut sums.to, &mut sums.squares] {
+        let Sums { from, to, squares, gathered } = sums;
+        for sum in [&mut *from, to, squares] {
             sum.clear();
             sum.resize(len, 0.0);
         }
-        let drives = match (given, self.weights.seeds()) {
-            (Some(given), _) => given.drives(),
-            (None, Some(seeds)) => Drives::Generator(&self.jumps, seeds),
+        let (lines, drives) = match (given, self.weights.seeds()) {
+            (Some(given), _) => (lines, given.drives()),
+            (None, Some(seeds)) if lines.fours.is_some() => {
+                let (lines, seeds) = lines.gathered(seeds, gathered);
+                (lines, Drives::Generator(&self.jumps, Seeds::Given(seeds)))
+            }
+            (None, Some(seeds)) => (lines, Drives::Generator(&self.jumps, seeds)),
             (None, None) => return,
         };
         match (self.weights.mode(), lines.to) {
-            (WeightMode::Binary, Some(to)) => {
-                signed_sums_2(drives, [lines.from, to], [&mut sums.from, &mut sums.to]);
+            (WeightMode::Binary, Some(values)) => {
+                signed_sums_2(drives, [lines.from, values], [from, to]);
             }
-            (WeightMode::Binary, None) => signed_sums(drives, lines.from, &mut sums.from),
-            (WeightMode::Analog, _) => analog_sums(drives, lines, &mut sums.from, &mut sums.squares),
+            (WeightMode::Binary, None) => signed_sums(drives, lines.from, from),
+            (WeightMode::Analog, _) => analog_sums(drives, lines, from, squares),
             (WeightMode::Raster, _) => {
                 if let Some(given) = given {
-                    for (i, sum) in sums.from.iter_mut().take(given.len).enumerate() {
+                    for (i, sum) in from.iter_mut().take(given.len).enumerate() {
                         *sum = given.raster(&lines, i);
                     }
                 }
@@ -441,7 +446,7 @@ impl Weights {
         let (mut rows, mut sums) = (Rows::new(self.clone()), Sums::default());
         for (out, first_row) in out.chunks_mut(RUN).zip((first_row..).step_by(RUN)) {
             rows.go_to(first_row, out.len());
-            let lines = Lines { from: values, to: None, share: &[0.0; RUN] };
+            let lines = Lines { from: values, to: None, share: &[0.0; RUN], fours: None };
             rows.sum(lines, &mut sums);
             for (i, out) in out.iter_mut().enumerate() {
                 *out = rows.weighted(&lines, &sums, i);

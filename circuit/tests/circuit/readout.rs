@@ -247,7 +247,7 @@ impl ConductanceSource for Broken {
     }
 
     fn segment(&mut self, _time_s: f64) -> Segment<'_> {
-        Segment { start_s: 0.0, end_s: self.end_s, conductance_s: &self.values, end_conductance_s: None }
+        Segment { start_s: 0.0, end_s: self.end_s, conductance_s: &self.values, end_conductance_s: None, fours: None }
     }
 }
 

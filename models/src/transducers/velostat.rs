@@ -331,7 +331,9 @@ impl Transducer for Velostat {
         if loaded != own {
             self.places.fill(0);
             (self.loaded.clear(), self.plays.clear(), self.slow.clear());
-            loaded.iter().for_each(|k| drop(self.load(*k as usize)));
+            for taxel in loaded {
+                self.load(taxel as usize);
+            }
         }
         for loaded in &mut self.loaded {
             state.f64(&mut loaded.since_s);

@@ -158,7 +158,16 @@ impl Chain {
     /// # Errors
     /// [`Refusal`] if the source of the weights cannot provide them.
     pub fn readout(&self, mode: Mode, session: u64) -> Result<Readout, Refusal> {
-        let readout = Readout::new(&self.profile, mode, &self.skin, self.streams, session).map_err(of_readout)?;
+        self.driven(Readout::new(&self.profile, mode, &self.skin, self.streams, session))
+    }
+
+    /// As [`Chain::readout`], by [`Readout::of_touches`].
+    pub(crate) fn readout_of_touches(&self, mode: Mode, session: u64) -> Result<Readout, Refusal> {
+        self.driven(Readout::of_touches(&self.profile, mode, &self.skin, self.streams, session))
+    }
+
+    fn driven(&self, readout: Result<Readout, Refusal>) -> Result<Readout, Refusal> {
+        let readout = readout.map_err(of_readout)?;
         match self.weights {
             WeightSource::Model => Ok(readout),
             WeightSource::Firmware => readout.with_codes(|weights| {
@@ -442,6 +451,18 @@ impl SkinSession {
         let mut map = ConductanceMap::zeros(self.rows, self.cols);
         self.transducer.step(electrode_pressure, hold_s, &mut map);
         map
+    }
+
+    /// [`hold`](Self::hold) with pressure on the taxels `pressed` alone, Pa, in order. `out` is what of the conductance
+    /// is not zero or was not before, S, in order.
+    pub(crate) fn hold_touched(&mut self, pressed: &[(u32, f64)], hold_s: f64, out: &mut Vec<(u32, f64)>) {
+        if self.transducer.step_touched(pressed, hold_s, out) {
+            return;
+        }
+        let mut pressure = PressureMap::zeros(self.rows, self.cols);
+        pressed.iter().for_each(|(taxel, pa)| pressure.values_mut()[*taxel as usize] = *pa);
+        out.clear();
+        out.extend((0..).zip(self.hold(&pressure, hold_s).values().iter().copied()));
     }
 
     /// Saves or loads what the skin remembers of this session.
