@@ -133,7 +133,7 @@ def entries(side, touched, kinds):
                 def step(group=group, wires=wires, worn=worn):
                     group.step()
                     for wire, attachment in zip(wires, worn):
-                        wire.record(attachment.last, MEASUREMENTS)
+                        wire.record(attachment.last, MEASUREMENTS, weights=False)
             else:
 
                 def step(group=group, worn=worn):

@@ -137,7 +137,7 @@ impl FoamLaw {
     }
 
     /// Pressure, Pa, and its slope dp/dδ, Pa/m, at the total compression `depth_m`; both 0 for a negative depth.
-    #[inline]
+    #[inline(always)]
     pub(crate) fn pressure_and_slope(&self, depth_m: f64) -> (f64, f64) {
         let (p, root) = self.root(if depth_m > 0.0 { depth_m } else { 0.0 });
         // 2 a p p′ + b p′ + b′ p − K_f = 0 with 2 a p + b = √(b² + 4 a K_f δ)
@@ -147,7 +147,7 @@ impl FoamLaw {
 
     /// Positive root p of the quadratic and √(b² + 4 a K_f δ). Without branches: a row of cells becomes vector
     /// instructions.
-    #[inline]
+    #[inline(always)]
     fn root(&self, depth_m: f64) -> (f64, f64) {
         let b = self.offset - depth_m * self.inverse_depth_per_m;
         let load = self.foam_pa_per_m * depth_m;

@@ -1,6 +1,6 @@
 //! Several bodies on one skin, flat or curved.
 
-use crate::balance::{Column, settle};
+use crate::balance::{Balance, Column};
 use crate::columns::WinklerLayer;
 use crate::envelope::KnownBody;
 use crate::field::{ContactField as _, PosedMesh, Wrench};
@@ -85,6 +85,7 @@ pub struct TouchSkin {
     surface: Surface,
     /// Columns under a body that is carried.
     columns: Vec<Column>,
+    balance: Balance,
     pressure: PressureMap,
     electrode_pressure: PressureMap,
     /// Taxels that may have a pressure, in their order.
@@ -164,6 +165,7 @@ impl TouchSkin {
             touched_m2: 0.0,
             bottomed: false,
             columns: Vec::new(),
+            balance: Balance::default(),
             layout,
             foam,
             surface,
@@ -329,7 +331,7 @@ impl TouchSkin {
                 c.across_m = [(c.point_m - centre).dot(u), (c.point_m - centre).dot(v)];
             }
             let law = self.foam.law(load.posed.stiffness_pa_per_m);
-            settle(&law, columns, load.normal_n);
+            self.balance.settle(&law, columns, load.normal_n);
             match &mut self.surface {
                 Surface::Flat(flat) => {
                     self.bottomed |= columns.iter().any(|c| c.depth_m > self.foam.thickness_m);

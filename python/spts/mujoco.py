@@ -20,6 +20,8 @@ else, for other data and for copies, MuJoCo's contact stays; the model is not ch
 from __future__ import annotations
 
 import ctypes
+import difflib
+import fnmatch
 import math
 import warnings
 
@@ -27,6 +29,7 @@ import mujoco
 import numpy as np
 
 from ._spts import Body, Mount, Mounts, Skin, Wire
+from .taxels import Table, areas_of, nearest, places_of, tables
 
 # Most times that a step is solved anew with the foam's law about another velocity, and the share of a force that may be
 # off before: what is left is of the order of its square.
@@ -513,16 +516,20 @@ def dress(
     model,
     data,
     links="all",
-    pitch=0.01,
+    pitch=None,
     thickness=0.003,
     wires="link",
     *,
+    taxels=None,
+    sites=None,
+    unit="m",
     mode="sense",
     readout="as_built",
     seed=0,
     **foam,
 ):
-    """Puts skins on links of a robot: their whole surface, from their geoms, with a taxel about every `pitch`.
+    """Puts skins on links of a robot: on their whole surface, from their geoms, with a taxel about every `pitch`; or with
+    taxels where a file or the model's sites say.
 
     Parameters
     ----------
@@ -530,16 +537,36 @@ def dress(
     data : mujoco.MjData
         Taxels inside the geoms of other links, as they stand in this data, are left out.
     links : "all" or sequence of str or int
-        Bodies; "all" are those with a geom that collides, but the world and what is welded to it.
-    pitch : float
-        Distance between taxels, m, [1e-4, 1].
+        Bodies; "all" are those with a geom that collides, but the world and what is welded to it, or those that
+        `taxels` or `sites` name.
+    pitch : float, optional
+        Distance between taxels, m, [1e-4, 1]; default 0.01. With `taxels` or `sites`, those without an area have the
+        square of it; by default, their share of the surface among their neighbours.
     thickness : float
         Thickness of the foam, m. It lies on the surface of the geoms.
     wires : "link", "limb", int or None
         "link": a wire a link. "limb": a wire a limb; the links up to the first body from the root that branches are
         one, and those that hang on one child of that body are another. n: the taxels of all links over n wires of
         nearly equal numbers, [1, taxels]; an end of a wire is that of a link where it moves by a tenth of a wire at
-        most. None: no wires.
+        most. None: no wires. A column `wire` of `taxels` overrides the others: the taxels of an entry are a wire, in
+        the order in which the entries first come.
+    taxels : path, sequence of paths, dict of links to them or to arrays, optional
+        Where the taxels are, a row each: x, y, z, and their outward normals nx, ny, nz, in the frame of the link.
+
+        CSV: with a header of these names, and maybe `area`, `wire`, and one of `link`, `body`, `site`, `geom`, which name
+        the frame of the place (a geom with a mesh has that of the mesh's file; a link is a body, or else a site or a
+        geom); or three or six columns without one. JSON: a list of objects with these fields, or ``{"links": {name:
+        {"points": [[x, y, z], ...], "normals": ..., "areas": ..., "wires": ...}}}``. The iCub's files of
+        `skinGui/conf/positions`, whose `name` is the link unless a dict names another. Rows of zeros have no taxel. A
+        file that names no link belongs to the only one of `links`. Arrays are of shape (n, 3) or (n, 6).
+
+        A taxel is put onto the surface of its link's geoms if it is within 20 mm of it; without a normal, it has that of
+        the surface.
+    sites : str, optional
+        In place of `taxels`, a pattern of names, such as "skin_*": a taxel at every such site, with the site's z axis as
+        its normal. A box, an ellipsoid or a cylinder gives the area.
+    unit : "m", "cm" or "mm"
+        Unit of the lengths in `taxels`; areas are in its square.
     mode : str
         As of `attach`.
     readout, seed
@@ -554,16 +581,22 @@ def dress(
     Raises
     ------
     ValueError
-        For a name that the model does not have, a link without a surface, and numbers outside their ranges.
+        For a name that the model does not have, a link without a surface, numbers outside their ranges, and files with
+        what is no taxel, or two at one place, by their lines.
+
+    Warns
+    -----
+    UserWarning
+        For taxels that have no surface of their link near them that looks their way, and for links without skin.
 
     ::
 
-        robot = spts.mujoco.dress(model, data)
+        robot = spts.mujoco.dress(model, data)      # or: dress(model, data, taxels={"palm": "palm.csv"}, unit="mm")
         for _ in range(1000):
             touches = robot.step()           # in place of mujoco.mj_step(model, data)
         print(robot.taxels, sum(t.pressure.ravel() @ s.areas for t, s in zip(touches, robot.skins)))
     """
-    if not 1e-4 <= pitch <= 1.0:
+    if pitch is not None and not 1e-4 <= pitch <= 1.0:
         raise ValueError(f"`pitch` = {pitch} is outside [1e-4, 1] m")
     counted = isinstance(wires, (int, np.integer)) and not isinstance(wires, bool)
     if not (wires is None or counted or wires in ("link", "limb")):
@@ -575,13 +608,21 @@ def dress(
         moving = (b for b in range(1, model.nbody) if model.body_weldid[b] != 0)
         links = [b for b in moving if _colliding(model, np.flatnonzero(model.geom_bodyid == b))]
     links = [_number(model, mujoco.mjtObj.mjOBJ_BODY, "links", link) for link in links]
+    placed = None
+    if taxels is not None or sites is not None:
+        placed = _placed(model, taxels, sites, unit, None if every else links)
+        links = list(placed)
     if not links:
         raise ValueError("`links` is empty: the model has no moving body with a geom that collides")
     if data.time == 0.0 and not data.xmat.any():
         mujoco.mj_kinematics(model, data)
     shapes, meshes, bare, dressed = {}, {}, [], []
     for link in links:
-        surface, bodies = _surface(model, data, link, pitch, meshes), _all(model, link)
+        if placed is None:
+            surface = _surface(model, data, link, 0.01 if pitch is None else pitch, meshes)
+        else:
+            surface = placed[link].lay(model, data, link, pitch, thickness, meshes)
+        bodies = _all(model, link)
         if surface is None or not bodies:
             bare.append(model.body(link).name)
             continue
@@ -611,14 +652,194 @@ def dress(
         )
         for link, skin, bodies in dressed
     ]
-    made, wired = _wires(model, links, skins, wires, readout, seed)
-    return Dress(attachments, made, [model.body(link).name for link in links], wired)
+    placed = [] if placed is None else [placed[link] for link in links]
+    made, wired = _wires(model, links, skins, wires, readout, seed, [part.wires for part in placed])
+    names = [model.body(link).name for link in links]
+    return Dress(attachments, made, names, wired, [part.rows for part in placed])
 
 
-def _wires(model, links, skins, wires, readout, seed):
-    """Wires over the skins of links, and the numbers of the links of each; None for a wire of one touch."""
+class _Placed:
+    """Taxels of a link, in its axes, as they were written."""
+
+    def __init__(self, parts):
+        self.places, self.normals, self.areas = (np.concatenate(values) for values in list(zip(*parts))[:3])
+        #: Tables and the numbers of their taxels.
+        self._of = [part[3:] for part in parts]
+        self.rows = np.concatenate([table.rows[taken] for table, taken in self._of])
+        wires = [table.wires[taken] for table, taken in self._of if table.wires is not None]
+        self.wires = np.concatenate(wires) if wires else None
+
+    def where(self, k):
+        for table, taken in self._of:
+            if k < len(taken):
+                return table.where(taken[k])
+            k -= len(taken)
+
+    def lay(self, model, data, link, pitch, thickness, meshes):
+        """Positions, normals and areas on the surface of the link."""
+        places, normals, areas = self.places, self.normals, self.areas
+        name, count = model.body(link).name, len(places)
+        place, counts = places_of(places)
+        if counts.max() > 1:
+            first = int(np.argmax(counts[place] > 1))
+            second = int(np.flatnonzero(place == place[first])[1])
+            text = f'two taxels are at one place, {places[first]} m of "{name}": {self.where(first)} and {self.where(second)}'
+            if not all(table.shared for table, _ in self._of):
+                raise ValueError(f"{text}; is the unit right?")
+            many = int((counts[place] > 1).sum())
+            warnings.warn(f"{text}; {many} of {count} share their places, and so their areas", stacklevel=3)
+        on, facing, _ = _shell(model, data, link, _SPACING, meshes, 1000, alone=True)
+        near = ((on > places.min(axis=0) - _NEAR) & (on < places.max(axis=0) + _NEAR)).all(axis=1)
+        on, facing = (on[near], facing[near]) if near.any() else (on, facing)
+        bare = np.flatnonzero(np.isnan(normals[:, 0]))
+        if len(bare):
+            found, away = nearest(places[bare], on, 1, _NEAR)
+            if np.isinf(away).any():
+                k = bare[np.argmax(away[:, 0])]
+                raise ValueError(
+                    f'{self.where(k)}: no normal, and no surface of "{name}" within {_NEAR:g} m to take it from'
+                )
+            normals[bare] = facing[found[:, 0]]
+        found, away = (v[:, 0] for v in nearest(places, on, 1, _NEAR, (normals, facing)))
+        lost = np.isinf(away)
+        if lost.any():
+            warnings.warn(
+                f'{lost.sum()} of {count} taxels of "{name}" have no surface of its geoms within {_NEAR:g} m that looks '
+                f"their way, and may feel nothing, such as {self.where(int(np.argmax(lost)))}: are unit, frame, link and "
+                "the sign of the normals right?",
+                stacklevel=3,
+            )
+        off = np.where(lost, 0.0, np.einsum("ij,ij->i", places - on[found], facing[found]))
+        off[np.abs(off) <= thickness / 3.0] = 0.0
+        places -= off[:, None] * facing[found]
+        unknown = np.isnan(areas)
+        if pitch is not None:
+            areas[unknown] = pitch**2
+        elif unknown.any():
+            # a share of what its place has
+            kept = np.unique(place, return_index=True)[1]
+            shares = areas_of(places[kept], normals[kept]) / counts
+            areas[unknown] = shares[place][unknown]
+            if np.isnan(areas).any():
+                k = int(np.argmax(np.isnan(areas)))
+                raise ValueError(
+                    f"{self.where(k)}: no area, and fewer than two taxels near it to tell it from; give `area` or `pitch`"
+                )
+        return places, normals, areas
+
+
+# Distance between samples of surfaces that taxels are put onto, and farthest that a taxel may be from one, m.
+_SPACING, _NEAR = 0.003, 0.02
+
+
+def _placed(model, taxels, sites, unit, links):
+    """Taxels by the numbers of their links; those of `links` alone, unless that is None."""
+    if taxels is not None and sites is not None:
+        raise ValueError("`taxels` and `sites` are both given; one of them says where the taxels are")
+    found = [(None, _sites(model, sites))] if taxels is None else tables(taxels, unit)
+    wired = [table.wires is not None for _, table in found]
+    if any(wired) and not all(wired):
+        raise ValueError(f"{found[wired.index(False)][1].source}: no column `wire`, which others have")
+    parts = {}
+    for link, table in found:
+        frames = table.frames
+        if link is not None or not frames:
+            if link is not None and frames:
+                raise ValueError(f'{table.source}: it has a column `{frames[0][0]}`, and is given for "{link}" too')
+            link = table.link if link is None else link
+            if link is None:
+                if links is None or len(links) != 1:
+                    raise ValueError(f"{table.source}: of which link? `taxels={{link: path}}` tells, or one of `links`")
+                link = links[0]
+        kind, named = frames[0] if frames else ("link", None)
+        for name, taken in [(link, np.arange(len(table.rows)))] if named is None else _groups(named):
+            body, pos, turn = _frame(model, f"{table.where(taken[0])}: `{kind}`", kind, name)
+            places, normals = (turn @ table.places[taken].T).T + pos, (turn @ table.normals[taken].T).T
+            parts.setdefault(body, []).append((places, normals, table.areas[taken], table, taken))
+    if links is not None:
+        missing = [model.body(link).name for link in links if link not in parts]
+        if missing:
+            raise ValueError(f"`links`: no taxel is on {', '.join(missing)}")
+    return {link: _Placed(parts[link]) for link in (sorted(parts) if links is None else links)}
+
+
+def _groups(labels):
+    """Every label, in the order in which they first come, with the numbers of its entries."""
+    seen = {}
+    of = np.fromiter((seen.setdefault(label, len(seen)) for label in labels.tolist()), np.intp, len(labels))
+    return zip(seen, np.split(np.argsort(of, kind="stable"), np.cumsum(np.bincount(of))[:-1]))
+
+
+def _frame(model, field, kind, name):
+    """Body, position and rotation of the frame that is called `name`, in that body's; a number is a body's."""
+    if not isinstance(name, str):
+        return _number(model, mujoco.mjtObj.mjOBJ_BODY, "taxels", name), np.zeros(3), np.eye(3)
+    obj = mujoco.mjtObj
+    known = {"body": obj.mjOBJ_BODY, "site": obj.mjOBJ_SITE, "geom": obj.mjOBJ_GEOM}
+    kinds, names = list(known) if kind == "link" else [kind], []
+    for kind in kinds:
+        number = mujoco.mj_name2id(model, known[kind], name)
+        if number >= 0:
+            break
+        names += filter(None, (mujoco.mj_id2name(model, known[kind], k) for k in range(_count(model, known[kind]))))
+    else:
+        close = difflib.get_close_matches(name, names, 5, 0.5) or sorted(set(names))[:20]
+        raise ValueError(f'{field}: the model has none called "{name}"; it has, among others: {", ".join(close)}')
+    if kind == "body":
+        return number, np.zeros(3), np.eye(3)
+    body = int(getattr(model, f"{kind}_bodyid")[number])
+    pos, turn = getattr(model, f"{kind}_pos")[number].copy(), _rotation(getattr(model, f"{kind}_quat")[number])
+    if kind == "geom" and model.geom_type[number] == mujoco.mjtGeom.mjGEOM_MESH:
+        # MuJoCo moves a mesh to its middle and turns it to its axes
+        mesh = model.geom_dataid[number]
+        turn = turn @ _rotation(model.mesh_quat[mesh]).T
+        pos -= turn @ model.mesh_pos[mesh]
+    return body, pos, turn
+
+
+def _rotation(quat):
+    rotation = np.empty(9)
+    mujoco.mju_quat2Mat(rotation, quat)
+    return rotation.reshape(3, 3)
+
+
+def _sites(model, pattern):
+    """The sites whose names a pattern has, as a table."""
+    names = [model.site(k).name for k in range(model.nsite)]
+    found = np.array([k for k, name in enumerate(names) if fnmatch.fnmatchcase(name, pattern)], int)
+    if len(found) == 0:
+        close = ", ".join(sorted(filter(None, names))[:20]) or "none with a name"
+        raise ValueError(f'`sites` = "{pattern}": no site of the model has such a name; it has: {close}')
+    columns = dict(zip(("x", "y", "z", "nx", "ny", "nz"), np.tile([0.0, 0.0, 0.0, 0.0, 0.0, 1.0], (len(found), 1)).T))
+    columns["site"] = [names[k] for k in found]
+    table = Table("`sites`", columns, word="site", numbers=columns["site"])
+    # what a sphere or a capsule is drawn with says nothing of an area
+    sizes, types = model.site_size[found], mujoco.mjtGeom
+    across = {types.mjGEOM_BOX: (4.0, 1), types.mjGEOM_ELLIPSOID: (np.pi, 1), types.mjGEOM_CYLINDER: (np.pi, 0)}
+    for shape, (factor, second) in across.items():
+        of = model.site_type[found] == shape
+        table.areas[of] = factor * sizes[of, 0] * sizes[of, second]
+    return table
+
+
+def _wires(model, links, skins, wires, readout, seed, labels=()):
+    """Wires over the skins of links, and the numbers of the links of each; None for a wire of one touch. `labels` are the
+    wires of all taxels, an array a link, where a file says them.
+    """
     if wires is None:
         return [], []
+    if labels and labels[0] is not None:
+        counts = np.array([len(part) for part in labels])
+        link = np.repeat(np.arange(len(links)), counts)
+        made, wired = [], []
+        for _, numbers in _groups(np.concatenate(labels)):
+            group, of = np.unique(link[numbers], return_inverse=True)
+            # among the taxels of the wire's links
+            skipped = (np.cumsum(counts) - counts)[group] - (np.cumsum(counts[group]) - counts[group])
+            taxels = (numbers - skipped[of]).tolist()
+            made.append(Wire([skins[k] for k in group], readout, seed=seed + len(made), taxels=taxels))
+            wired.append(group.tolist())
+        return made, wired
     if isinstance(wires, str) and wires == "link":
         return [Wire(skin, readout, seed=seed + k) for k, skin in enumerate(skins)], [None] * len(skins)
     counts = np.array([skin.shape[0] * skin.shape[1] for skin in skins])
@@ -669,7 +890,7 @@ def _limbs(model, links):
 class Dress:
     """Skins on the links of a robot: what `dress` returns."""
 
-    def __init__(self, attachments, wires, names, wired=()):
+    def __init__(self, attachments, wires, names, wired=(), rows=()):
         #: A skin a link: what `attach` returns, in the order of the links.
         self.attachments = attachments
         #: The wires: one a link in the same order, one a limb, or as many as were asked for; empty without wires.
@@ -677,6 +898,8 @@ class Dress:
         self._wired = wired
         #: Names of the links.
         self.names = names
+        #: Numbers of the rows of the file that the taxels of every link come from, (taxels,) of int; empty by pitch.
+        self.rows = rows
         self.model, self.data = attachments[0].model, attachments[0].data
         self._group = _Group(attachments)
 
@@ -749,8 +972,8 @@ class Dress:
         self.detach()
 
 
-# Samples along a pitch, from which taxels are made, and most taxels of a geom.
-_SAMPLES, _MOST = 5, 100_000
+# Samples along a pitch, from which taxels are made, most taxels of a geom, and neighbours that a rim may go to.
+_SAMPLES, _MOST, _RIVALS = 5, 1_000_000, 10
 
 
 def _surface(model, data, link, pitch, meshes):
@@ -760,56 +983,77 @@ def _surface(model, data, link, pitch, meshes):
     Samples a fifth of the pitch apart on every geom, without those inside other geoms, are gathered by the cells of a grid
     of the pitch and by the side that they look to.
     """
-    geoms = _colliding(model, np.flatnonzero(model.geom_bodyid == link))
-    no_surface = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
-    geoms = [g for g in geoms if model.geom_type[g] not in no_surface]
-    name = model.body(link).name
-    if not geoms:
-        raise ValueError(f'`links`: "{name}" has no geom with a surface that collides')
-    others = [g for b in range(model.nbody) for g in _colliding(model, np.flatnonzero(model.geom_bodyid == b))]
-    turn, origin = data.xmat[link].reshape(3, 3), data.xpos[link]
-    places, normals, areas = [], [], []
-    for geom in geoms:
-        vertices, faces = meshes[geom] = _mesh(model, geom)
-        place, normal, area = _samples(vertices[faces], pitch / _SAMPLES)
-        at = place @ turn.T + origin
-        # a sample on the surface of its own geom is not inside it
-        inside = np.zeros(len(at), bool)
-        for other in others:
-            if other != geom and (model.geom_bodyid[other] == link or model.body_weldid[model.geom_bodyid[other]] != 0):
-                inside |= _inside(model, data, other, at)
-        places.append(place[~inside]), normals.append(normal[~inside]), areas.append(area[~inside])
-    place, normal, area = (np.concatenate(part) for part in (places, normals, areas))
+    place, normal, area = _shell(model, data, link, pitch / _SAMPLES, meshes)
     if len(place) == 0:
         return None
     side = np.abs(normal).argmax(axis=1)
     side = 2 * side + (np.take_along_axis(normal, side[:, None], 1)[:, 0] > 0.0)
-    key = np.concatenate([np.floor(place / pitch + 0.5).astype(np.int64), side[:, None]], axis=1)
-    _, cell = np.unique(key, axis=0, return_inverse=True)
-    cell = cell.ravel()
-    sums = [np.bincount(cell, area)]
-    sums += [np.bincount(cell, area * v) for v in (*place.T, *normal.T)]
-    whole = sums[0]
-    middle, mean = np.stack(sums[1:4], 1) / whole[:, None], np.stack(sums[4:7], 1)
+    at = np.floor(place / pitch + 0.5).astype(np.int64)
+    at -= at.min(axis=0)
+    wide = at.max(axis=0) + 1
+    _, cell = np.unique(((at[:, 0] * wide[1] + at[:, 1]) * wide[2] + at[:, 2]) * 6 + side, return_inverse=True)
+    whole, middle, mean = _gathered(cell, place, normal, area)
     # rims of cells go to their neighbour that looks the same way
     small = whole < 0.3 * pitch**2
     if small.any() and not small.all():
         kept = np.flatnonzero(~small)
         mean /= np.linalg.norm(mean, axis=1, keepdims=True)
-        for k in np.flatnonzero(small):
-            away = np.linalg.norm(middle[kept] - middle[k], axis=1) + pitch * (1.0 - mean[kept] @ mean[k])
-            cell[cell == k] = kept[away.argmin()]
-        kept, cell = np.unique(cell, return_inverse=True)
-        sums = [np.bincount(cell, area)] + [np.bincount(cell, area * v) for v in (*place.T, *normal.T)]
-        whole = sums[0]
-        middle, mean = np.stack(sums[1:4], 1) / whole[:, None], np.stack(sums[4:7], 1)
+        near, away = nearest(middle[small], middle[kept], min(_RIVALS, len(kept)))
+        near = kept[near]
+        away += pitch * (1.0 - np.einsum("ijk,ik->ij", mean[near], mean[small]))
+        of = np.arange(len(whole))
+        of[small] = np.take_along_axis(near, away.argmin(axis=1)[:, None], 1)[:, 0]
+        cell = np.searchsorted(kept, of)[cell]
+        whole, middle, mean = _gathered(cell, place, normal, area)
     # the sample nearest to the middle lies on the surface
-    order = np.lexsort((np.linalg.norm(place - middle[cell], axis=1), cell))
-    first = order[np.searchsorted(cell[order], np.arange(len(whole)))]
+    away = np.linalg.norm(place - middle[cell], axis=1)
+    least = np.full(len(whole), np.inf)
+    np.minimum.at(least, cell, away)
+    best = np.flatnonzero(away == least[cell])[::-1]
+    first = np.empty(len(whole), np.intp)
+    first[cell[best]] = best
     return place[first], mean / np.linalg.norm(mean, axis=1, keepdims=True), whole
 
 
-def _samples(corners, spacing):
+def _gathered(cell, place, normal, area):
+    """Areas, middles and sums of the normals of cells."""
+    whole = np.bincount(cell, area)
+    sums = [np.bincount(cell, area * values) for values in (*place.T, *normal.T)]
+    return whole, np.stack(sums[:3], 1) / whole[:, None], np.stack(sums[3:], 1)
+
+
+def _shell(model, data, link, spacing, meshes, least=12, alone=False):
+    """Places, normals and areas of samples on the geoms of a link, in its axes, that lie in no other geom; with `alone`,
+    in none of the link. At least `least` a geom."""
+    geoms = _colliding(model, np.flatnonzero(model.geom_bodyid == link))
+    no_surface = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
+    geoms = [g for g in geoms if model.geom_type[g] not in no_surface]
+    if not geoms:
+        raise ValueError(f'`links`: "{model.body(link).name}" has no geom with a surface that collides')
+    others = model.geom_bodyid == link
+    if not alone:
+        others |= model.body_weldid[model.geom_bodyid] != 0
+    others = _colliding(model, np.flatnonzero(others))
+    turn, origin = data.xmat[link].reshape(3, 3), data.xpos[link]
+    places, normals, areas = [], [], []
+    for geom in geoms:
+        vertices, faces = meshes[geom] = _mesh(model, geom)
+        place, normal, area = _samples(vertices[faces], spacing, least)
+        # faster than place @ turn.T, by 30 times
+        at = (turn @ place.T).T + origin
+        # a sample on the surface of its own geom is not inside it
+        inside = np.zeros(len(at), bool)
+        for other in others:
+            apart = np.linalg.norm(data.geom_xpos[other] - data.geom_xpos[geom])
+            if other != geom and apart < model.geom_rbound[other] + model.geom_rbound[geom]:
+                to = at - data.geom_xpos[other]
+                near = np.flatnonzero(np.einsum("ij,ij->i", to, to) < model.geom_rbound[other] ** 2)
+                inside[near] |= _inside(model, data, other, at[near])
+        places.append(place[~inside]), normals.append(normal[~inside]), areas.append(area[~inside])
+    return tuple(np.concatenate(part) for part in (places, normals, areas))
+
+
+def _samples(corners, spacing, least):
     """Places, normals and areas of samples about `spacing` apart on triangles (n, 3, 3)."""
     a, b, c = corners[:, 0], corners[:, 1], corners[:, 2]
     cross = np.cross(b - a, c - a)
@@ -823,22 +1067,26 @@ def _samples(corners, spacing):
         raise ValueError(
             f"`pitch` = {_SAMPLES * spacing:g} m makes {ends[-1] / (_SAMPLES * spacing) ** 2:.3g} taxels of one geom; at most {_MOST}"
         )
-    count = max(12, math.ceil(ends[-1] / spacing**2))
+    count = max(least, math.ceil(ends[-1] / spacing**2))
     number = np.arange(count)
     of = np.minimum(np.searchsorted(ends, (number + 0.5) * (ends[-1] / count)), len(ends) - 1)
     # the R2 sequence of M. Roberts (2018), folded into the triangle
     u, v = (0.5 + 0.7548776662466927 * (number + 1)) % 1.0, (0.5 + 0.5698402909980532 * (number + 1)) % 1.0
     over = u + v > 1.0
     u, v = np.where(over, 1.0 - u, u), np.where(over, 1.0 - v, v)
-    a, b, c = corners[of, 0], corners[of, 1], corners[of, 2]
-    place = a + u[:, None] * (b - a) + v[:, None] * (c - a)
+    a, ab, ac = (
+        np.ascontiguousarray(side) for side in (corners[:, 0], *(corners[:, 1:] - corners[:, :1]).swapaxes(0, 1))
+    )
+    place = a[of]
+    place += u[:, None] * ab[of]
+    place += v[:, None] * ac[of]
     return place, (cross / double[:, None])[of], np.full(count, ends[-1] / count)
 
 
 def _inside(model, data, geom, places):
     """Which places, in the world, are inside a geom; of meshes, inside their box of half the size."""
     kind, size = model.geom_type[geom], model.geom_size[geom]
-    at = (places - data.geom_xpos[geom]) @ data.geom_xmat[geom].reshape(3, 3)
+    at = (data.geom_xmat[geom].reshape(3, 3).T @ (places - data.geom_xpos[geom]).T).T
     types = mujoco.mjtGeom
     along = np.abs(at[:, 2])
     across = np.hypot(at[:, 0], at[:, 1])

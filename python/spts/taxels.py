@@ -23,8 +23,8 @@ _PASSED = ("", "id", "index", "name")
 # What may be wrong with lengths.
 _UNIT = '; is the unit right? unit="mm" and unit="cm" are the others'
 
-# Farthest place from the origin of its frame, m, and largest area of a taxel, m².
-_FAR, _LARGE = 10.0, 1.0
+# Farthest place from the origin of its frame, m, largest area of a taxel, m², and side of what is one place, m.
+_FAR, _LARGE, _APART = 10.0, 1.0, 5e-5
 
 
 class Table:
@@ -71,7 +71,9 @@ class Table:
         self._need(near, self.places, f"m, farther than {_FAR:g} m from the origin{_UNIT}")
         if given:
             length = np.linalg.norm(self.normals, axis=1)
-            self._need(length > 1e-12, self.normals, "a normal of zero length; without its columns the surface gives it")
+            self._need(
+                length > 1e-12, self.normals, "a normal of zero length; without its columns the surface gives it"
+            )
             self.normals /= length[:, None]
         if "area" in columns:
             valid = (self.areas > 0.0) & (self.areas <= _LARGE)
@@ -97,7 +99,7 @@ def tables(taxels, unit):
     for link, value in given:
         if isinstance(value, (str, os.PathLike)):
             value = [value]
-        if all(isinstance(path, (str, os.PathLike)) for path in value):
+        if np.iterable(value) and all(isinstance(path, (str, os.PathLike)) for path in value):
             found += [(link, table) for path in value for table in read(path, unit)]
         else:
             source = "`taxels`" if link is None else f'`taxels["{link}"]`'
@@ -143,11 +145,11 @@ def _icub(path, text, unit):
 
 
 def _csv(path, lines, unit, first=0, **of):
-    numbers = [k for k, line in enumerate(lines, 1) if line and not line.isspace() and line.lstrip()[0] != "#"]
-    if not numbers:
+    lines = [line.partition("#")[0].strip() for line in lines]
+    numbers = np.array([k for k, line in enumerate(lines, first + 1) if line])
+    lines = [line for line in lines if line]
+    if not lines:
         raise ValueError(f"{path}: no taxel in it")
-    lines = [lines[k - 1].split("#", 1)[0].strip() for k in numbers]
-    numbers = np.array(numbers) + first
     separator = next((mark for mark in ";," if mark in lines[0]), None)
     names = [field.strip(" \t\"'") for field in lines[0].split(separator)]
     if any(_number(name) is None for name in names):
@@ -164,7 +166,9 @@ def _csv(path, lines, unit, first=0, **of):
         raise ValueError(
             f"{path}: line {numbers[0]} has {len(names)} numbers; without a header x y z or x y z nx ny nz are read"
         )
-    counts = [len(line.split()) for line in lines] if separator is None else [line.count(separator) + 1 for line in lines]
+    counts = (
+        [len(line.split()) for line in lines] if separator is None else [line.count(separator) + 1 for line in lines]
+    )
     for number, count, line in zip(numbers, counts, lines):
         if count != len(names):
             for field in line.split(separator):
@@ -179,7 +183,9 @@ def _csv(path, lines, unit, first=0, **of):
             for k in wanted:
                 if _number(fields[k]) is None:
                     _comma(path, number, fields[k])
-                    raise ValueError(f"{path}: line {number}: `{names[k]}` = {fields[k].strip()!r} is no number") from None
+                    raise ValueError(
+                        f"{path}: line {number}: `{names[k]}` = {fields[k].strip()!r} is no number"
+                    ) from None
         raise
     columns = dict(zip((names[k] for k in wanted), values.T))
     for k, name in enumerate(names):
@@ -258,8 +264,15 @@ def _plain(source, values, *counts):
     return dict(zip((*_PLACE, *_NORMAL), values.T))
 
 
+def places_of(places):
+    """Number of the place of every taxel, and how many taxels each place has."""
+    x, y, z = np.round(places / _APART).astype(np.int64).T + (1 << 19)
+    _, place, counts = np.unique((x << 40) + (y << 20) + z, return_inverse=True, return_counts=True)
+    return place, counts
+
+
 # Pairs that `nearest` looks at once.
-_PAIRS = 2_000_000
+_PAIRS = 500_000
 
 
 def nearest(points, among=None, count=1, reach=np.inf, normals=None):
@@ -292,42 +305,44 @@ def nearest(points, among=None, count=1, reach=np.inf, normals=None):
         x, y, z = np.floor((places - low) / side).astype(np.int64).T + 1
         return (x * across + y) * across + z, across
 
-    # cells of a cube are as small as leaves a few points in each
+    # cubes as small as leaves a few points in each, of those that have any
     side = reach
     while side > max(2.0**-19 * extent, 1e-9):
         filled = np.unique(cells(among, side)[0], return_counts=True)[1]
-        if (filled**2).sum() <= max(2.0, 0.5 * count) * len(among):
+        if (filled**2).sum() <= max(2.0, 0.65 * count) * len(among):
             break
-        side *= 0.5
+        side *= 0.8
     left = np.arange(len(points))
     while True:
         key, across = cells(among, side)
         order = np.argsort(key, kind="stable")
-        key = key[order]
+        key, sorted_ = key[order], among[order]
         mine, _ = cells(points[left], side)
         by = np.argsort(mine, kind="stable")
         left = left[by]
-        # the cells around a point: nine rows of three
+        # the cubes around a point: nine rows of three
         columns = mine[by][:, None] + (around[0] * across + around[1]).ravel() * across
         first = np.searchsorted(key, columns - 1)
         lengths = np.searchsorted(key, columns + 1, "right") - first
-        ends, short, start = np.cumsum(lengths.sum(axis=1)), [], 0
+        whole = lengths.sum(axis=1)
+        ends, short, start = np.cumsum(whole), [], 0
         while start < len(left):
             before = ends[start - 1] if start else 0
             stop = max(start + 1, int(np.searchsorted(ends, before + _PAIRS)))
             part, sizes = left[start:stop], lengths[start:stop].ravel()
-            row = np.repeat(np.arange(stop - start), lengths[start:stop].sum(axis=1))
-            other = order[np.arange(len(row)) + np.repeat(first[start:stop].ravel() + sizes - np.cumsum(sizes), sizes)]
-            square = ((points[part[row]] - among[other]) ** 2).sum(axis=1)
-            near = square <= side**2
-            if own:
-                near &= part[row] != other
+            row = np.repeat(np.arange(stop - start), whole[start:stop])
+            other = np.arange(len(row)) + np.repeat(first[start:stop].ravel() + sizes - np.cumsum(sizes), sizes)
+            to = points[part][row] - sorted_[other]
+            square = np.einsum("ij,ij->i", to, to)
+            near = np.flatnonzero(square <= side**2)
+            row, other, square = row[near], order[other[near]], square[near]
+            near = part[row] != other if own else np.ones(len(row), bool)
             if normals is not None:
                 near &= np.einsum("ij,ij->i", normals[0][part[row]], normals[1][other]) > 0.5
             row, other, square = row[near], other[near], square[near]
             by = np.lexsort((square, row))
             row, other, square = row[by], other[by], square[by]
-            rank = np.arange(len(row)) - np.searchsorted(row, row)
+            rank = np.arange(len(row)) - np.searchsorted(row, np.arange(stop - start))[row]
             taken = rank < count
             at = part[row[taken]], rank[taken]
             found[at], away[at] = other[taken], np.sqrt(square[taken])
@@ -336,27 +351,36 @@ def nearest(points, among=None, count=1, reach=np.inf, normals=None):
         left = np.concatenate(short)
         if len(left) == 0 or side >= reach:
             return found, away
-        side = min(2.0 * side, reach)
+        side = min(1.4 * side, reach)
 
 
 # Directions in which a cell is measured, and its reach towards the open, in distances of the two nearest.
 _RAYS, _WIDE, _OPEN = 16, 1.2, 0.5
 
 
-def areas(places, normals, found, away):
-    """Areas of taxels (n,), m², by their neighbours as `nearest` gives them: of their Voronoi cells in their tangent
-    planes. A cell without a bound within 1.2 of the mean distance of the two nearest ends at half that distance. NaN
-    for a taxel with fewer than two neighbours.
+def areas_of(places, normals):
+    """Areas of taxels (n,), m²: of their Voronoi cells in their tangent planes, among the eight nearest that look their
+    way. A cell without a bound within 1.2 of the mean distance of the two nearest ends at half that distance. NaN for a
+    taxel with fewer than two others within 0.1 m.
     """
+    found, away = nearest(places, None, 8, 0.1, (normals, normals))
     spacing = away[:, :2].mean(axis=1)
+    alone = np.isinf(spacing)
+    spacing[alone] = 1.0
     u = np.cross(normals, np.eye(3)[np.abs(normals).argmin(axis=1)])
     u /= np.linalg.norm(u, axis=1, keepdims=True)
-    to = places[found] - places[:, None]
-    a, b = np.einsum("ijk,ik->ij", to, u), np.einsum("ijk,ik->ij", to, np.cross(normals, u))
-    half = np.where(np.isfinite(away), 0.5 * (a * a + b * b), np.inf)
-    whole = np.zeros(len(places))
+    v = np.cross(normals, u)
+    # of the lines half-way to the neighbours, the inverse of the distance along a ray is a sum of these
+    a, b = np.empty(found.T.shape), np.empty(found.T.shape)
+    for k, other in enumerate(found.T):
+        to = places[other] - places
+        a[k], b[k] = np.einsum("ij,ij->i", to, u), np.einsum("ij,ij->i", to, v)
+        half = np.where(np.isfinite(away[:, k]), np.maximum(0.5 * (a[k] ** 2 + b[k] ** 2), 1e-300), np.inf)
+        a[k] /= half
+        b[k] /= half
+    nearer, whole = 1.0 / (_WIDE * spacing), np.zeros(len(places))
     for angle in (np.arange(_RAYS) + 0.5) * (2.0 * np.pi / _RAYS):
-        along = a * np.cos(angle) + b * np.sin(angle)
-        bound = np.divide(half, along, out=np.full(half.shape, np.inf), where=along > 0.0).min(axis=1)
-        whole += np.where(bound > _WIDE * spacing, _OPEN * spacing, bound) ** 2
-    return np.where(np.isfinite(spacing), whole * (np.pi / _RAYS), np.nan)
+        inverse = (a * np.cos(angle) + b * np.sin(angle)).max(axis=0)
+        whole += np.where(inverse < nearer, _OPEN * spacing, 1.0 / np.maximum(inverse, nearer)) ** 2
+    whole[alone] = np.nan
+    return whole * (np.pi / _RAYS)

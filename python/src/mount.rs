@@ -333,15 +333,15 @@ impl Mount {
         }
         let standing = self.standing(&solved.poses);
         let felt = |&(number, body, sign): &(usize, usize, f64)| {
-            let Contact { place: at, axes: [normal, ..], .. } = solved.contacts[number];
-            let along = scaled(normal, sign);
+            let contact = &solved.contacts[number];
+            let (at, along) = (contact.on(sign), scaled(contact.axes[0], sign));
             if self.pushes(&standing, at, along) {
                 return true;
             }
             let same = loads.iter().filter(|(_, other, _)| *other == body);
-            let (sum, middle) = same.fold((0.0, [0.0; 3]), |(sum, middle), &(other, ..)| {
+            let (sum, middle) = same.fold((0.0, [0.0; 3]), |(sum, middle), &(other, _, sign)| {
                 let force_n = solved.of(other)[0].max(0.0);
-                (sum + force_n, plus(middle, scaled(solved.contacts[other].place, force_n)))
+                (sum + force_n, plus(middle, scaled(solved.contacts[other].on(sign), force_n)))
             });
             let middle = scaled(middle, 1.0 / sum);
             sum > 0.0 && self.pushes(&standing, plus(middle, scaled(minus(at, middle), 0.8)), along)
@@ -412,6 +412,7 @@ fn lining(lined: &[Lining], body: usize) -> (f64, f64) {
 struct Contacts<'py> {
     geom: PyReadonlyArray2<'py, i32>,
     pos: PyReadonlyArray2<'py, f64>,
+    dist: PyReadonlyArray1<'py, f64>,
     frame: PyReadonlyArray2<'py, f64>,
     friction: PyReadonlyArray2<'py, f64>,
     dim: PyReadonlyArray1<'py, i32>,
@@ -423,10 +424,11 @@ impl Contacts<'_> {
     fn all(&self) -> Vec<Contact> {
         let [pos, frame, friction] = [&self.pos, &self.frame, &self.friction].map(|array| array.as_array());
         let [dim, address, exclude] = [&self.dim, &self.efc_address, &self.exclude].map(|array| array.as_array());
-        let geom = self.geom.as_array();
+        let (geom, dist) = (self.geom.as_array(), self.dist.as_array());
         let contact = |k: usize| Contact {
             geoms: row(&geom, k),
             place: row(&pos, k),
+            overlap_m: (-dist[k]).max(0.0),
             axes: rotation(&frame, k),
             friction: row(&friction, k),
             dim: usize::try_from(dim[k]).unwrap_or(0),
@@ -440,8 +442,10 @@ impl Contacts<'_> {
 /// A contact of an `mjData`.
 struct Contact {
     geoms: [i32; 2],
-    /// m.
+    /// In the middle between the surfaces of both geoms, m.
     place: Vector,
+    /// How far the geoms are in each other, m.
+    overlap_m: f64,
     /// The normal, from the first geom to the second, and two tangents.
     axes: Rotation,
     friction: [f64; 5],
@@ -450,6 +454,13 @@ struct Contact {
     /// Its first row in the constraints, if it has any.
     first: Option<usize>,
     excluded: bool,
+}
+
+impl Contact {
+    /// Its place on the surface of the geom that pushes the other one along `sign` times the normal, m.
+    fn on(&self, sign: f64) -> Vector {
+        plus(self.place, scaled(self.axes[0], 0.5 * sign * self.overlap_m))
+    }
 }
 
 /// Skins that step together.
@@ -555,7 +566,7 @@ impl Mounts {
     fn felt_by(&self, poses: &Poses<'_>, contact: &Contact, mut each: impl FnMut(usize, usize, f64)) {
         self.meets(contact, |k, body, sign| {
             let mount = self.mounts[k].get();
-            if mount.pushes(&mount.standing(poses), contact.place, scaled(contact.axes[0], sign)) {
+            if mount.pushes(&mount.standing(poses), contact.on(sign), scaled(contact.axes[0], sign)) {
                 each(k, body, sign);
             }
         });

@@ -1,7 +1,7 @@
 //! Foam on a surface of any shape.
 
 use super::points::SurfacePoints;
-use super::solid::{Solid, Standing, into};
+use super::solid::{Beams, Solid, Standing, into};
 use crate::balance::Column;
 use crate::field::{PosedMesh, Wrench};
 use crate::foam::{Foam, FoamLaw};
@@ -60,8 +60,11 @@ struct Near {
     middle_m: Vector,
     /// Distance up to which it was looked for points, m.
     reach_m: f64,
-    /// Places of the columns in the tree.
+    /// Places of the columns in the tree, and the columns themselves.
     columns: Vec<usize>,
+    beams: Beams,
+    /// How deep the body reaches into them, m.
+    depths_m: Vec<f64>,
 }
 
 /// Most bodies of which it is known what is near; with more, the oldest is looked for again. They are found one by one.
@@ -245,11 +248,10 @@ impl SurfaceField {
             return;
         }
         let k = self.near(body, &standing, h + gap_m);
-        out.extend(self.nearby[k].columns.iter().filter_map(|place| {
-            let c = &self.tree.columns[*place];
-            let depth_m = standing.front_m(c.point_m - c.normal * h, c.normal, h, gap_m)?;
-            Some(Column { depth_m, ..*c })
-        }));
+        let Near { columns, beams, depths_m, .. } = &mut self.nearby[k];
+        standing.fronts_m(beams, h, gap_m, depths_m);
+        let there = columns.iter().zip(depths_m).filter(|(_, depth_m)| **depth_m > f64::NEG_INFINITY);
+        out.extend(there.map(|(place, depth_m)| Column { depth_m: *depth_m, ..self.tree.columns[*place] }));
     }
 
     /// Which of `self.nearby` has the columns whose points may be within `reach_m` of a body.
@@ -273,7 +275,8 @@ impl SurfaceField {
                 self.nearby.remove(0);
             }
             let (solid, columns) = (standing.solid().clone(), Vec::new());
-            self.nearby.push(Near { solid, rotation, middle_m, reach_m, columns });
+            let (beams, depths_m) = (Beams::default(), Vec::new());
+            self.nearby.push(Near { solid, rotation, middle_m, reach_m, columns, beams, depths_m });
             self.nearby.len() - 1
         });
         let near = &mut self.nearby[known];
@@ -290,6 +293,11 @@ impl SurfaceField {
                 false
             },
         );
+        near.beams.clear();
+        for place in &near.columns {
+            let c = &self.tree.columns[*place];
+            near.beams.push(c.point_m - c.normal * self.config.thickness_m, c.normal);
+        }
         known
     }
 
@@ -324,12 +332,14 @@ impl SurfaceField {
         let regular = c.friction_speed_m_per_s * c.friction_speed_m_per_s;
         let (mut force, mut torque) = (Vector::ZERO, Vector::ZERO);
         let centre = Vector::from(body.centre_of_mass_m);
-        for place in &self.nearby[k].columns {
-            let Column { index, point_m, normal, area_m2, .. } = self.tree.columns[*place];
-            let depth_m = standing.depth_m(point_m - normal * c.thickness_m, normal, c.thickness_m);
+        let Near { columns, beams, depths_m, .. } = &mut self.nearby[k];
+        standing.fronts_m(beams, c.thickness_m, 0.0, depths_m);
+        for (place, depth_m) in columns.iter().zip(depths_m) {
+            let depth_m = *depth_m;
             if depth_m <= 0.0 {
                 continue;
             }
+            let Column { index, point_m, normal, area_m2, .. } = self.tree.columns[*place];
             self.bottomed |= depth_m > c.thickness_m;
             let arm = point_m - normal * depth_m - centre;
             let velocity = Vector::from(velocity_at(body, arm.into()));

@@ -2,9 +2,11 @@
 
 use crate::field::PosedMesh;
 use crate::mesh::TriMesh;
+use multiversion::multiversion;
 use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::math::Vector;
 use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhLeafCost};
+use parry3d_f64::query::PointQuery as _;
 use std::sync::Arc;
 
 /// Share of a triangle by which rays beside it count as hits, so that none passes between two triangles.
@@ -90,52 +92,31 @@ impl Primitive {
     /// Where the line p + t d enters and leaves the shape; `None` beside it. `d` has the length 1.
     #[inline]
     fn chord(&self, p: Vector, d: Vector) -> Option<[f64; 2]> {
-        match *self {
-            Self::Ellipsoid(half_m) => {
-                let inverse = Vector::from(half_m).recip();
-                between(quadratic((d * inverse).length_squared(), (p * inverse).dot(d * inverse), {
-                    (p * inverse).length_squared() - 1.0
-                })?)
-            }
-            Self::Cuboid([x, y, z]) => {
-                let sides = [slab(p.x, d.x, x), slab(p.y, d.y, y), slab(p.z, d.z, z)];
-                between(sides.into_iter().fold(EVERYWHERE, both))
-            }
-            Self::Cylinder(radius_m, half_m) => {
-                between(both(round(p, d, radius_m).unwrap_or(NOWHERE), slab(p.z, d.z, half_m)))
-            }
-            Self::Capsule(radius_m, half_m) => {
-                let ball = |z: f64| {
-                    let p = Vector::new(p.x, p.y, p.z - z);
-                    quadratic(1.0, p.dot(d), p.length_squared() - radius_m * radius_m)
-                };
-                let wall = between(both(round(p, d, radius_m).unwrap_or(NOWHERE), slab(p.z, d.z, half_m)));
-                // convex: the chords of its parts are one
-                [wall, ball(half_m), ball(-half_m)]
-                    .into_iter()
-                    .flatten()
-                    .reduce(|a, b| [a[0].min(b[0]), a[1].max(b[1])])
-            }
-            Self::HalfSpace => {
-                let at = -p.z / d.z;
-                match d.z {
-                    z if z > 0.0 => Some([f64::NEG_INFINITY, at]),
-                    z if z < 0.0 => Some([at, f64::INFINITY]),
-                    _ => (p.z < 0.0).then_some(EVERYWHERE),
-                }
-            }
-        }
+        let ends = match *self {
+            Self::Ellipsoid(half_m) => ellipsoid(Vector::from(half_m).recip(), p, d),
+            Self::Cuboid(half_m) => cuboid(half_m, p, d),
+            Self::Cylinder(radius_m, half_m) => cylinder(radius_m, half_m, p, d),
+            Self::Capsule(radius_m, half_m) => capsule(radius_m, half_m, p, d),
+            Self::HalfSpace => half_space(p, d),
+        };
+        (ends[0] < ends[1]).then_some(ends)
     }
 
-    /// Whether a place is farther from its round sides than `reach_m`.
+    /// A distance, m, from which a place is at least away from it; negative inside.
     #[inline]
-    fn is_off_side(&self, p: Vector, reach_m: f64) -> bool {
-        let (radius_m, square) = match *self {
-            Self::Ellipsoid([x, y, z]) => (x.max(y).max(z), p.length_squared()),
-            Self::Cylinder(radius_m, _) | Self::Capsule(radius_m, _) => (radius_m, p.x * p.x + p.y * p.y),
-            Self::Cuboid(_) | Self::HalfSpace => return false,
-        };
-        square > (radius_m + reach_m) * (radius_m + reach_m)
+    fn away_m(&self, p: Vector) -> f64 {
+        let beside = |p: Vector, half: Vector| (p.abs() - half).max(Vector::ZERO);
+        match *self {
+            // in units of the half axes no distance shrinks by more than the least of them
+            Self::Ellipsoid([x, y, z]) => ((p / Vector::new(x, y, z)).length() - 1.0) * x.min(y).min(z),
+            Self::Cuboid(half_m) => beside(p, Vector::from(half_m)).length(),
+            Self::Cylinder(radius_m, half_m) => {
+                let across = p.x.hypot(p.y);
+                beside(Vector::new(across, 0.0, p.z), Vector::new(radius_m, 0.0, half_m)).length()
+            }
+            Self::Capsule(radius_m, half_m) => beside(p, Vector::new(0.0, 0.0, half_m)).length() - radius_m,
+            Self::HalfSpace => p.z,
+        }
     }
 
     /// Half the sides of the box around it, m.
@@ -152,46 +133,170 @@ impl Primitive {
 const EVERYWHERE: [f64; 2] = [f64::NEG_INFINITY, f64::INFINITY];
 const NOWHERE: [f64; 2] = [f64::INFINITY, f64::NEG_INFINITY];
 
-#[inline]
-fn both(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
-    [a[0].max(b[0]), a[1].min(b[1])]
+// Where lines p + t d enter and leave shapes: the first end is not before the second where they miss. Without branches:
+// many lines become vector instructions.
+
+#[inline(always)]
+fn less(a: f64, b: f64) -> f64 {
+    if a < b { a } else { b }
 }
 
-#[inline]
-fn between(ends: [f64; 2]) -> Option<[f64; 2]> {
-    (ends[0] < ends[1]).then_some(ends)
+#[inline(always)]
+fn more(a: f64, b: f64) -> f64 {
+    if a > b { a } else { b }
+}
+
+#[inline(always)]
+fn select(is: bool, a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [if is { a[0] } else { b[0] }, if is { a[1] } else { b[1] }]
+}
+
+#[inline(always)]
+fn both(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [more(a[0], b[0]), less(a[1], b[1])]
+}
+
+/// Of chords of a convex shape that hang together, or miss.
+#[inline(always)]
+fn either(a: [f64; 2], b: [f64; 2]) -> [f64; 2] {
+    [less(a[0], b[0]), more(a[1], b[1])]
 }
 
 /// The roots of a t² + 2 b t + c = 0 in their order, for a > 0.
-#[inline]
-fn quadratic(a: f64, b: f64, c: f64) -> Option<[f64; 2]> {
+#[inline(always)]
+fn quadratic(a: f64, b: f64, c: f64) -> [f64; 2] {
     let discriminant = b * b - a * c;
-    (discriminant > 0.0).then(|| {
-        // without cancellation
-        let q = -b - discriminant.sqrt().copysign(b);
-        let (one, other) = (q / a, c / q);
-        [one.min(other), one.max(other)]
-    })
+    // without cancellation
+    let q = -b - more(discriminant, 0.0).sqrt().copysign(b);
+    let (one, other) = (q / a, c / q);
+    select(discriminant > 0.0, [less(one, other), more(one, other)], NOWHERE)
 }
 
 /// The line inside an endless cylinder about z.
-#[inline]
-fn round(p: Vector, d: Vector, radius_m: f64) -> Option<[f64; 2]> {
+#[inline(always)]
+fn round(p: Vector, d: Vector, radius_m: f64) -> [f64; 2] {
     let (a, c) = (d.x * d.x + d.y * d.y, p.x * p.x + p.y * p.y - radius_m * radius_m);
-    if a < 1e-24 {
-        return (c < 0.0).then_some(EVERYWHERE);
-    }
-    quadratic(a, p.x * d.x + p.y * d.y, c)
+    let along = select(c < 0.0, EVERYWHERE, NOWHERE);
+    select(a < 1e-24, along, quadratic(more(a, 1e-24), p.x * d.x + p.y * d.y, c))
 }
 
 /// Where a coordinate p + t d lies within ± half.
-#[inline]
+#[inline(always)]
 fn slab(p: f64, d: f64, half_m: f64) -> [f64; 2] {
-    if d == 0.0 {
-        return if p.abs() < half_m { EVERYWHERE } else { NOWHERE };
-    }
+    let along = select(p.abs() < half_m, EVERYWHERE, NOWHERE);
     let (a, b) = ((-half_m - p) / d, (half_m - p) / d);
-    [a.min(b), a.max(b)]
+    select(d == 0.0, along, [less(a, b), more(a, b)])
+}
+
+#[inline(always)]
+fn ellipsoid(inverse: Vector, p: Vector, d: Vector) -> [f64; 2] {
+    let (p, d) = (p * inverse, d * inverse);
+    quadratic(d.length_squared(), p.dot(d), p.length_squared() - 1.0)
+}
+
+#[inline(always)]
+fn cuboid([x, y, z]: [f64; 3], p: Vector, d: Vector) -> [f64; 2] {
+    both(both(slab(p.x, d.x, x), slab(p.y, d.y, y)), slab(p.z, d.z, z))
+}
+
+#[inline(always)]
+fn cylinder(radius_m: f64, half_m: f64, p: Vector, d: Vector) -> [f64; 2] {
+    both(round(p, d, radius_m), slab(p.z, d.z, half_m))
+}
+
+#[inline(always)]
+fn capsule(radius_m: f64, half_m: f64, p: Vector, d: Vector) -> [f64; 2] {
+    let ball = |z: f64| {
+        let p = Vector::new(p.x, p.y, p.z - z);
+        quadratic(1.0, p.dot(d), p.length_squared() - radius_m * radius_m)
+    };
+    let wall = cylinder(radius_m, half_m, p, d);
+    let wall = select(wall[0] < wall[1], wall, NOWHERE);
+    either(wall, either(ball(half_m), ball(-half_m)))
+}
+
+#[inline(always)]
+fn half_space(p: Vector, d: Vector) -> [f64; 2] {
+    let at = -p.z / d.z;
+    let along = select(p.z < 0.0, EVERYWHERE, NOWHERE);
+    select(d.z > 0.0, [f64::NEG_INFINITY, at], select(d.z < 0.0, [at, f64::INFINITY], along))
+}
+
+/// How deep a convex shape whose chord is `ends` reaches into a column: [`Standing::front_m`] of one part; −∞ where there
+/// is nothing.
+#[inline(always)]
+fn front([enter, leave]: [f64; 2], thickness_m: f64, reach_m: f64) -> f64 {
+    let (inward_m, there) = (-enter, enter < leave);
+    let through = thickness_m + less(inward_m, thickness_m);
+    let around = there && enter < f64::MIN_POSITIVE && leave > -f64::MIN_POSITIVE;
+    let before = there && enter >= f64::MIN_POSITIVE && enter <= reach_m;
+    let inside = if leave > 0.0 && inward_m < leave { through } else { f64::NEG_INFINITY };
+    if around { inside } else { if before { thickness_m - enter } else { f64::NEG_INFINITY } }
+}
+
+/// Columns of foam, as lines: their bases, m, and directions, coordinate by coordinate.
+#[derive(Debug, Clone, Default)]
+pub(super) struct Beams {
+    base_m: [Vec<f64>; 3],
+    outward: [Vec<f64>; 3],
+}
+
+impl Beams {
+    pub(super) fn clear(&mut self) {
+        self.base_m.iter_mut().chain(&mut self.outward).for_each(Vec::clear);
+    }
+
+    pub(super) fn push(&mut self, base_m: Vector, outward: Vector) {
+        self.base_m.iter_mut().zip(base_m.to_array()).for_each(|(all, v)| all.push(v));
+        self.outward.iter_mut().zip(outward.to_array()).for_each(|(all, v)| all.push(v));
+    }
+
+    fn each(&self, mut see: impl FnMut(usize, Vector, Vector)) {
+        for k in 0..self.base_m[0].len() {
+            let [base_m, outward] = [&self.base_m, &self.outward].map(|v| Vector::new(v[0][k], v[1][k], v[2][k]));
+            see(k, base_m, outward);
+        }
+    }
+}
+
+/// [`front`] of one part for all `beams`, with the best instructions of this machine.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+fn fronts(part: &StandingPart, beams: &Beams, [thickness_m, reach_m]: [f64; 2], out: &mut [f64]) {
+    let StandingPart { shape, axes, origin_m, .. } = part;
+    match *shape {
+        Primitive::Ellipsoid(half_m) => {
+            let inverse = Vector::from(half_m).recip();
+            fronts_of(axes, *origin_m, beams, [thickness_m, reach_m], out, |p, d| ellipsoid(inverse, p, d));
+        }
+        Primitive::Cuboid(half_m) => {
+            fronts_of(axes, *origin_m, beams, [thickness_m, reach_m], out, |p, d| cuboid(half_m, p, d));
+        }
+        Primitive::Cylinder(r, half_m) => {
+            fronts_of(axes, *origin_m, beams, [thickness_m, reach_m], out, |p, d| cylinder(r, half_m, p, d));
+        }
+        Primitive::Capsule(r, half_m) => {
+            fronts_of(axes, *origin_m, beams, [thickness_m, reach_m], out, |p, d| capsule(r, half_m, p, d));
+        }
+        Primitive::HalfSpace => fronts_of(axes, *origin_m, beams, [thickness_m, reach_m], out, half_space),
+    }
+}
+
+#[inline(always)]
+fn fronts_of(
+    axes: &[Vector; 3],
+    origin_m: Vector,
+    beams: &Beams,
+    [thickness_m, reach_m]: [f64; 2],
+    out: &mut [f64],
+    ends: impl Fn(Vector, Vector) -> [f64; 2],
+) {
+    let count = out.len();
+    let [x, y, z] = [0, 1, 2].map(|k| &beams.base_m[k][..count]);
+    let [a, b, c] = [0, 1, 2].map(|k| &beams.outward[k][..count]);
+    for k in 0..count {
+        let p = into(axes, Vector::new(x[k], y[k], z[k]) - origin_m);
+        out[k] = front(ends(p, into(axes, Vector::new(a[k], b[k], c[k]))), thickness_m, reach_m);
+    }
 }
 
 /// A solid where a body is.
@@ -286,6 +391,18 @@ impl Standing<'_> {
         self.front_m(base_m, outward, thickness_m, 0.0).unwrap_or(0.0)
     }
 
+    /// [`front_m`](Self::front_m) of all `beams`; −∞ where there is nothing.
+    pub(super) fn fronts_m(&self, beams: &Beams, thickness_m: f64, gap_m: f64, out: &mut Vec<f64>) {
+        out.clear();
+        out.resize(beams.base_m[0].len(), f64::NEG_INFINITY);
+        match &self.parts[..] {
+            [part] => fronts(part, beams, [thickness_m, thickness_m + gap_m], out),
+            _ => beams.each(|k, base_m, outward| {
+                out[k] = self.front_m(base_m, outward, thickness_m, gap_m).unwrap_or(f64::NEG_INFINITY);
+            }),
+        }
+    }
+
     /// From the chords of the parts.
     #[inline]
     fn front_of_parts(&self, base_m: Vector, outward: Vector, thickness_m: f64, gap_m: f64) -> Option<f64> {
@@ -296,13 +413,9 @@ impl Standing<'_> {
         while pending {
             pending = false;
             first_m = f64::INFINITY;
-            for StandingPart { shape, axes, origin_m, half_m } in &self.parts {
+            for StandingPart { shape, axes, origin_m, .. } in &self.parts {
                 let base_m = into(axes, base_m - *origin_m);
-                let far = match shape {
-                    Primitive::HalfSpace => base_m.z > reach_m,
-                    _ => base_m.abs().cmpgt(*half_m + reach_m).any() || shape.is_off_side(base_m, reach_m),
-                };
-                if far {
+                if shape.away_m(base_m) > reach_m {
                     continue;
                 }
                 let Some([enter, leave]) = shape.chord(base_m, into(axes, outward)) else { continue };
@@ -338,11 +451,12 @@ impl Standing<'_> {
                     return height_m > 0.0 && (height_m > radius_m || height_m > up.abs().dot(half_m));
                 }
                 let at = into(axes, away);
-                is_beside(axes, at, [-*half, *half]) || shape.is_off_side(at, reach_m + radius_m)
+                shape.away_m(at) > reach_m + radius_m || is_beside(axes, at, [-*half, *half])
             }),
-            Form::Mesh(_) => {
+            Form::Mesh(mesh) => {
                 let at = into(&self.axes, centre_m - self.origin_m);
-                is_beside(&self.axes, at, [self.solid.low_m, self.solid.high_m])
+                let box_m = [self.solid.low_m, self.solid.high_m];
+                is_beside(&self.axes, at, box_m) || mesh.is_clear(at, reach_m + radius_m)
             }
         }
     }
@@ -480,6 +594,18 @@ impl Mesh {
         };
         let through = self.is_through(base_m, outward, out_m);
         through.then(|| thickness_m + self.behind_m(base_m, outward, thickness_m))
+    }
+
+    /// Whether a closed mesh has nothing of itself within `radius_m` of a place, m.
+    fn is_clear(&self, place_m: Vector, radius_m: f64) -> bool {
+        let around = Aabb::new(place_m - radius_m, place_m + radius_m);
+        let near = |leaf: u32| {
+            let Triangle { corner_m: a, edges_m: [e, f], .. } = self.triangles[leaf as usize];
+            parry3d_f64::shape::Triangle::new(a, a + e, a + f).distance_to_local_point(place_m, false) <= radius_m
+        };
+        let root = self.boxes.root_aabb();
+        let beside = place_m.cmplt(root.mins).any() || place_m.cmpgt(root.maxs).any();
+        self.closed && !self.boxes.intersect_aabb(&around).any(near) && (beside || !self.holds(place_m))
     }
 
     /// Whether a place, m, in the box around a closed mesh is inside it: by the ray to the nearest side of the box,
