@@ -1,7 +1,7 @@
 //! Foam on a surface of any shape.
 
 use super::points::SurfacePoints;
-use super::solid::{Beams, Solid, Standing, into};
+use super::solid::{Beams, Group, LANES, Solid, Standing, into};
 use crate::balance::Column;
 use crate::field::{PosedMesh, Wrench};
 use crate::foam::{Foam, FoamLaw};
@@ -63,6 +63,8 @@ struct Near {
     /// Places of the columns in the tree, and the columns themselves.
     columns: Vec<usize>,
     beams: Beams,
+    /// What they may meet of a mesh.
+    groups: Vec<Group>,
     /// How deep the body reaches into them, m.
     depths_m: Vec<f64>,
 }
@@ -97,7 +99,7 @@ struct Node {
 }
 
 /// Most points of a node without others below it.
-const LEAF: usize = 8;
+const LEAF: usize = LANES;
 
 impl Tree {
     fn of(points: &SurfacePoints) -> Self {
@@ -248,8 +250,8 @@ impl SurfaceField {
             return;
         }
         let k = self.near(body, &standing, h + gap_m);
-        let Near { columns, beams, depths_m, .. } = &mut self.nearby[k];
-        standing.fronts_m(beams, h, gap_m, depths_m);
+        let Near { columns, beams, groups, depths_m, .. } = &mut self.nearby[k];
+        standing.fronts_m(beams, groups, h, gap_m, depths_m);
         let there = columns.iter().zip(depths_m).filter(|(_, depth_m)| **depth_m > f64::NEG_INFINITY);
         out.extend(there.map(|(place, depth_m)| Column { depth_m: *depth_m, ..self.tree.columns[*place] }));
     }
@@ -266,7 +268,8 @@ impl SurfaceField {
             let turned: f64 = (0..3).map(|k| (rotation[k] - near.rotation[k]).length_squared()).sum();
             let moved_m = (middle_m - near.middle_m).length() + turned.sqrt() * 0.5 * (high - low).length();
             // a longer reach than is asked for means columns in vain
-            if moved_m + reach_m <= near.reach_m && near.reach_m <= 4.0 * reach_m {
+            let same = near.groups.is_empty() || moved_m <= MARGIN * self.config.thickness_m;
+            if same && moved_m + reach_m <= near.reach_m && near.reach_m <= 4.0 * reach_m {
                 return known;
             }
         }
@@ -275,29 +278,43 @@ impl SurfaceField {
                 self.nearby.remove(0);
             }
             let (solid, columns) = (standing.solid().clone(), Vec::new());
-            let (beams, depths_m) = (Beams::default(), Vec::new());
-            self.nearby.push(Near { solid, rotation, middle_m, reach_m, columns, beams, depths_m });
+            let (beams, groups, depths_m) = (Beams::default(), Vec::new(), Vec::new());
+            self.nearby.push(Near { solid, rotation, middle_m, reach_m, columns, beams, groups, depths_m });
             self.nearby.len() - 1
         });
         let near = &mut self.nearby[known];
         (near.rotation, near.middle_m) = (rotation, middle_m);
-        near.reach_m = reach_m + MARGIN * self.config.thickness_m;
+        let margin_m = MARGIN * self.config.thickness_m;
+        near.reach_m = reach_m + margin_m;
         near.columns.clear();
-        let reach_m = near.reach_m;
+        near.beams.clear();
+        near.groups.clear();
+        let (reach_m, is_mesh) = (near.reach_m, standing.parts().is_empty());
         self.tree.visit(
             |node| standing.is_far(node.centre_m, node.radius_m, node.half_m, reach_m),
             |first, columns| {
-                let is_near = |c: &Column| !standing.is_far(c.point_m, 0.0, Vector::ZERO, reach_m);
-                let numbered = columns.iter().enumerate().filter(|(_, c)| is_near(c));
-                near.columns.extend(numbered.map(|(k, _)| first + k));
+                let begin = near.columns.len();
+                let base_m = |c: &Column| c.point_m - c.normal * self.config.thickness_m;
+                for (k, c) in columns.iter().enumerate() {
+                    if is_mesh || !standing.is_far(c.point_m, 0.0, Vector::ZERO, reach_m) {
+                        near.columns.push(first + k);
+                        near.beams.push(base_m(c), c.normal);
+                    }
+                }
+                if is_mesh {
+                    let middles = [|c: &Column, _| c.point_m, |c: &Column, h| c.point_m - c.normal * h].map(|of| {
+                        let points = || columns.iter().map(|c| of(c, self.config.thickness_m));
+                        let middle_m = points().sum::<Vector>() / columns.len() as f64;
+                        (middle_m, points().map(|at| (at - middle_m).length()).fold(0.0, f64::max))
+                    });
+                    let radius_m = middles[0].1.max(middles[1].1);
+                    let lanes = begin..near.columns.len();
+                    let centres_m = middles.map(|(middle_m, _)| middle_m);
+                    near.groups.push(standing.look(lanes, centres_m, radius_m, [reach_m, margin_m]));
+                }
                 false
             },
         );
-        near.beams.clear();
-        for place in &near.columns {
-            let c = &self.tree.columns[*place];
-            near.beams.push(c.point_m - c.normal * self.config.thickness_m, c.normal);
-        }
         known
     }
 
@@ -332,8 +349,8 @@ impl SurfaceField {
         let regular = c.friction_speed_m_per_s * c.friction_speed_m_per_s;
         let (mut force, mut torque) = (Vector::ZERO, Vector::ZERO);
         let centre = Vector::from(body.centre_of_mass_m);
-        let Near { columns, beams, depths_m, .. } = &mut self.nearby[k];
-        standing.fronts_m(beams, c.thickness_m, 0.0, depths_m);
+        let Near { columns, beams, groups, depths_m, .. } = &mut self.nearby[k];
+        standing.fronts_m(beams, groups, c.thickness_m, 0.0, depths_m);
         for (place, depth_m) in columns.iter().zip(depths_m) {
             let depth_m = *depth_m;
             if depth_m <= 0.0 {

@@ -7,6 +7,7 @@ use parry3d_f64::bounding_volume::Aabb;
 use parry3d_f64::math::Vector;
 use parry3d_f64::partitioning::{Bvh, BvhBuildStrategy, BvhLeafCost};
 use parry3d_f64::query::PointQuery as _;
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Share of a triangle by which rays beside it count as hits, so that none passes between two triangles.
@@ -251,12 +252,59 @@ impl Beams {
         self.outward.iter_mut().zip(outward.to_array()).for_each(|(all, v)| all.push(v));
     }
 
-    fn each(&self, mut see: impl FnMut(usize, Vector, Vector)) {
-        for k in 0..self.base_m[0].len() {
-            let [base_m, outward] = [&self.base_m, &self.outward].map(|v| Vector::new(v[0][k], v[1][k], v[2][k]));
-            see(k, base_m, outward);
+    fn len(&self) -> usize {
+        self.base_m[0].len()
+    }
+
+    /// Base, m, and direction of column `k`.
+    fn at(&self, k: usize) -> [Vector; 2] {
+        [&self.base_m, &self.outward].map(|v| Vector::new(v[0][k], v[1][k], v[2][k]))
+    }
+}
+
+/// Neighbouring columns, and what they may meet of a mesh.
+#[derive(Debug, Clone)]
+pub(super) struct Group {
+    /// At most [`LANES`].
+    lanes: Range<usize>,
+    /// Its triangles, if they are few enough to be tried one by one.
+    triangles: Option<Vec<Triangle>>,
+    /// Whether all bases are outside the mesh, which is closed.
+    outside: bool,
+}
+
+/// Columns of a group.
+pub(super) const LANES: usize = 8;
+/// Most triangles of a group.
+const MANY: usize = 48;
+
+/// Distance, m, at which each of the beams from `first` on first meets one of `triangles`, which are in the axes of a body,
+/// and whether it enters there (1) or leaves (-1). Infinity where there is none, and past the last beam.
+#[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
+fn hits(triangles: &[Triangle], beams: &Beams, first: usize, [axes, origin_m]: [&[Vector; 3]; 2]) -> [[f64; LANES]; 2] {
+    let lanes = |values: &[f64]| -> [f64; LANES] {
+        std::array::from_fn(|l| values.get(first + l).copied().unwrap_or(f64::NAN))
+    };
+    let [bx, by, bz] = [0, 1, 2].map(|k| lanes(&beams.base_m[k]));
+    let [ax, ay, az] = [0, 1, 2].map(|k| lanes(&beams.outward[k]));
+    let (mut starts, mut ways) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
+    for l in 0..LANES {
+        let start = into(axes, Vector::new(bx[l], by[l], bz[l]) - origin_m[0]);
+        let way = into(axes, Vector::new(ax[l], ay[l], az[l]));
+        (starts[0][l], starts[1][l], starts[2][l]) = (start.x, start.y, start.z);
+        (ways[0][l], ways[1][l], ways[2][l]) = (way.x, way.y, way.z);
+    }
+    let (mut nearest_m, mut enters) = ([f64::INFINITY; LANES], [0.0; LANES]);
+    for triangle in triangles {
+        for l in 0..LANES {
+            let start_m = Vector::new(starts[0][l], starts[1][l], starts[2][l]);
+            let (distance_m, determinant) = triangle.meets(start_m, Vector::new(ways[0][l], ways[1][l], ways[2][l]));
+            let nearer = distance_m < nearest_m[l];
+            nearest_m[l] = if nearer { distance_m } else { nearest_m[l] };
+            enters[l] = if nearer { determinant } else { enters[l] };
         }
     }
+    [nearest_m, enters]
 }
 
 /// [`front`] of one part for all `beams`, with the best instructions of this machine.
@@ -391,16 +439,59 @@ impl Standing<'_> {
         self.front_m(base_m, outward, thickness_m, 0.0).unwrap_or(0.0)
     }
 
-    /// [`front_m`](Self::front_m) of all `beams`; −∞ where there is nothing.
-    pub(super) fn fronts_m(&self, beams: &Beams, thickness_m: f64, gap_m: f64, out: &mut Vec<f64>) {
+    /// [`front_m`](Self::front_m) of all `beams`; −∞ where there is nothing. `near` is what
+    /// [`Standing::look`] found for each of their groups, not too far from here.
+    pub(super) fn fronts_m(&self, beams: &Beams, near: &[Group], thickness_m: f64, gap_m: f64, out: &mut Vec<f64>) {
         out.clear();
-        out.resize(beams.base_m[0].len(), f64::NEG_INFINITY);
-        match &self.parts[..] {
-            [part] => fronts(part, beams, [thickness_m, thickness_m + gap_m], out),
-            _ => beams.each(|k, base_m, outward| {
-                out[k] = self.front_m(base_m, outward, thickness_m, gap_m).unwrap_or(f64::NEG_INFINITY);
-            }),
+        out.resize(beams.len(), f64::NEG_INFINITY);
+        let reach_m = thickness_m + gap_m;
+        let ray = |k: usize| {
+            let [base_m, outward] = beams.at(k);
+            self.front_m(base_m, outward, thickness_m, gap_m).unwrap_or(f64::NEG_INFINITY)
+        };
+        match (&*self.solid.form, &self.parts[..]) {
+            (Form::Parts(_), [part]) => fronts(part, beams, [thickness_m, reach_m], out),
+            (Form::Parts(_), _) => out.iter_mut().enumerate().for_each(|(k, out)| *out = ray(k)),
+            (Form::Mesh(mesh), _) => {
+                for group in near {
+                    let lanes = group.lanes.clone();
+                    let Some(triangles) = &group.triangles else {
+                        lanes.for_each(|k| out[k] = ray(k));
+                        continue;
+                    };
+                    let [hits_m, enters] = hits(triangles, beams, lanes.start, [&self.axes, &[self.origin_m; 3]]);
+                    for (l, k) in lanes.enumerate() {
+                        if hits_m[l] < reach_m && (enters[l] > 0.0 || !mesh.closed) {
+                            out[k] = thickness_m - hits_m[l];
+                        } else if hits_m[l] < reach_m || !group.outside {
+                            out[k] = ray(k);
+                        }
+                    }
+                }
+            }
         }
+    }
+
+    /// What columns `lanes` meet while the body moves by less than `margin_m`: all have their points within `radius_m` of
+    /// `centre_m` and their bases as far from `base_m`, and reach within `reach_m` of their points.
+    pub(super) fn look(
+        &self,
+        lanes: Range<usize>,
+        [centre_m, base_m]: [Vector; 2],
+        radius_m: f64,
+        [reach_m, margin_m]: [f64; 2],
+    ) -> Group {
+        let mut group = Group { lanes, triangles: None, outside: false };
+        if let Form::Mesh(mesh) = &*self.solid.form {
+            let [centre_m, base_m] = [centre_m, base_m].map(|at| into(&self.axes, at - self.origin_m));
+            let around = |at: Vector, reach_m: f64| Aabb::new(at - reach_m, at + reach_m);
+            let found = around(centre_m, radius_m + reach_m);
+            let found = mesh.boxes.intersect_aabb(&found).take(MANY + 1).map(|k| mesh.triangles[k as usize]);
+            group.triangles = Some(found.collect()).filter(|found: &Vec<Triangle>| found.len() <= MANY);
+            let clear = mesh.boxes.intersect_aabb(&around(base_m, radius_m + margin_m)).next().is_none();
+            group.outside = mesh.closed && clear && !mesh.holds(base_m);
+        }
+        group
     }
 
     /// From the chords of the parts.
@@ -603,15 +694,16 @@ impl Mesh {
             let Triangle { corner_m: a, edges_m: [e, f], .. } = self.triangles[leaf as usize];
             parry3d_f64::shape::Triangle::new(a, a + e, a + f).distance_to_local_point(place_m, false) <= radius_m
         };
-        let root = self.boxes.root_aabb();
-        let beside = place_m.cmplt(root.mins).any() || place_m.cmpgt(root.maxs).any();
-        self.closed && !self.boxes.intersect_aabb(&around).any(near) && (beside || !self.holds(place_m))
+        self.closed && !self.boxes.intersect_aabb(&around).any(near) && !self.holds(place_m)
     }
 
-    /// Whether a place, m, in the box around a closed mesh is inside it: by the ray to the nearest side of the box,
-    /// which meets little.
+    /// Whether a place, m, is inside a closed mesh: by the ray to the nearest side of the box around it, which meets
+    /// little.
     fn holds(&self, place_m: Vector) -> bool {
         let root = self.boxes.root_aabb();
+        if place_m.cmplt(root.mins).any() || place_m.cmpgt(root.maxs).any() {
+            return false;
+        }
         let (below, above) = (place_m - root.mins, root.maxs - place_m);
         let (low, high) = (below.min_element(), above.min_element());
         let (gaps, nearest, sign) = if low < high { (below, low, -1.0) } else { (above, high, 1.0) };
@@ -650,22 +742,26 @@ impl Triangle {
     /// T. Möller and B. Trumbore, Fast, minimum storage ray/triangle intersection, J. Graphics Tools 2 (1997) 21.
     #[inline]
     fn hit(&self, start_m: Vector, direction: Vector) -> Option<Hit> {
+        let (distance_m, determinant) = self.meets(start_m, direction);
+        (distance_m < f64::INFINITY).then_some(Hit { distance_m, enters: determinant > 0.0 })
+    }
+
+    /// Distance at which a ray meets it, infinity if it does not, and a number that is positive where the ray enters.
+    /// Without branches.
+    #[inline(always)]
+    fn meets(&self, start_m: Vector, direction: Vector) -> (f64, f64) {
         let [e, f] = self.edges_m;
         let p = direction.cross(f);
         let determinant = e.dot(p);
-        if determinant.abs() <= EDGE_ON * self.size_m2 {
-            return None;
-        }
         let inverse = 1.0 / determinant;
         let from_corner = start_m - self.corner_m;
         let u = from_corner.dot(p) * inverse;
         let q = from_corner.cross(e);
         let v = direction.dot(q) * inverse;
-        if u < -SLACK || v < -SLACK || u + v > 1.0 + SLACK {
-            return None;
-        }
         let distance_m = f.dot(q) * inverse;
-        (distance_m >= 0.0).then_some(Hit { distance_m, enters: determinant > 0.0 })
+        let faces = determinant.abs() > EDGE_ON * self.size_m2;
+        let within = (u >= -SLACK) & (v >= -SLACK) & (u + v <= 1.0 + SLACK);
+        (if faces & within & (distance_m >= 0.0) { distance_m } else { f64::INFINITY }, determinant)
     }
 }
 
