@@ -157,10 +157,14 @@ impl TouchSkin {
     }
 
     fn with(layout: SkinLayout, foam: Foam, surface: Surface) -> Self {
-        let zeros = || PressureMap::zeros(layout.rows(), layout.cols());
+        let pressure = PressureMap::zeros(layout.rows(), layout.cols());
+        let electrode_pressure = match surface {
+            Surface::Flat(_) => pressure.clone(),
+            Surface::Curved(_) => PressureMap::zeros(0, 0),
+        };
         Self {
-            pressure: zeros(),
-            electrode_pressure: zeros(),
+            pressure,
+            electrode_pressure,
             touched: Vec::new(),
             touched_m2: 0.0,
             bottomed: false,
@@ -276,7 +280,8 @@ impl TouchSkin {
 
     /// Removes everything from the skin.
     fn clear(&mut self) {
-        for map in [&mut self.pressure, &mut self.electrode_pressure] {
+        let electrodes = Some(&mut self.electrode_pressure).filter(|map| !map.values().is_empty());
+        for map in electrodes.into_iter().chain([&mut self.pressure]) {
             self.touched.iter().for_each(|k| map.values_mut()[*k] = 0.0);
         }
         self.touched.clear();

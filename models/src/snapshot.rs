@@ -94,7 +94,8 @@ impl Snapshot {
         let mut count = values.len() as u64;
         self.u64(&mut count);
         // no list is longer than all that was saved
-        values.resize(usize::try_from(count).unwrap_or(usize::MAX).min(self.words.len()), 0);
+        let most = if self.loaded.is_some() { self.words.len() } else { values.len() };
+        values.resize(usize::try_from(count).unwrap_or(usize::MAX).min(most), 0);
         for value in values {
             let mut word = u64::from(*value);
             self.u64(&mut word);
@@ -149,6 +150,21 @@ mod tests {
         loading.rng(&mut copy);
         loading.finish().unwrap();
         assert_eq!(copy.random::<[u64; 100]>(), rng.random::<[u64; 100]>());
+    }
+
+    #[test]
+    fn lists_have_any_length() {
+        let (mut list, mut saving) = (vec![7, 0, u32::MAX], Snapshot::saving());
+        saving.u32s(&mut list);
+        let (mut copy, words) = (vec![1; 5], saving.finish().unwrap());
+        let mut loading = Snapshot::loading(words.clone());
+        loading.u32s(&mut copy);
+        loading.finish().unwrap();
+        assert_eq!((&copy, words.len()), (&list, 4));
+        // a length that cannot be
+        let mut loading = Snapshot::loading(vec![u64::MAX, 3]);
+        loading.u32s(&mut copy);
+        assert!(loading.finish().is_err() && copy.len() <= 2);
     }
 
     #[test]

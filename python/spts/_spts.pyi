@@ -22,6 +22,7 @@ class Body:
         stiffness: float | None = None,
         repair: Literal["strict", "near_side"] = "strict",
         centre: bool = False,
+        tolerance: float | None = None,
     ) -> Body: ...
     @staticmethod
     def from_vertices(
@@ -29,7 +30,10 @@ class Body:
         faces: ArrayLike,
         stiffness: float | None = None,
         parts: Sequence[tuple[str, _Triple, _Triple, Sequence[float]]] = ...,
+        tolerance: float | None = None,
     ) -> Body: ...
+    @property
+    def error(self) -> float: ...
     @staticmethod
     def sphere(radius: float, stiffness: float | None = None) -> Body: ...
     @staticmethod

@@ -50,6 +50,7 @@ def attach(
     bodies="all",
     link_geoms=None,
     mode="sense",
+    tolerance=None,
 ):
     """Puts `skin` on a link of a model.
 
@@ -73,6 +74,8 @@ def attach(
         on the world covers those that are not of `bodies`.
     mode : str
         "sense": MuJoCo's contact moves the bodies, and the skin reads its forces. "foam": the foam moves them.
+    tolerance : float, optional
+        Of the shapes of `bodies`, as of `body_of`.
 
     Returns
     -------
@@ -90,13 +93,15 @@ def attach(
         place = int(model.site_bodyid[site]), model.site_pos[site], model.site_quat[site]
     else:
         place = _number(model, mujoco.mjtObj.mjOBJ_BODY, "body", body), pos, quat
-    return Attachment(model, data, skin, *place, bodies=bodies, link_geoms=link_geoms, mode=mode)
+    return Attachment(
+        model, data, skin, *place, bodies=bodies, link_geoms=link_geoms, mode=mode, tolerance=tolerance
+    )
 
 
 class Attachment:
     """A skin on a link of a model: what `attach` returns."""
 
-    def __init__(self, model, data, skin, link, pos, quat, *, bodies="all", link_geoms=None, mode="sense"):
+    def __init__(self, model, data, skin, link, pos, quat, *, bodies="all", link_geoms=None, mode="sense", tolerance=None):
         if mode not in ("sense", "foam"):
             raise ValueError(f'`mode` = "{mode}"; valid: "sense", "foam"')
         self.mode = mode
@@ -133,7 +138,7 @@ class Attachment:
                 number = _number(model, mujoco.mjtObj.mjOBJ_BODY, "bodies", name)
             if number == link or model.body_weldid[number] == model.body_weldid[link] != 0:
                 raise ValueError(f'`bodies`: "{name}" is a part of the skin\'s own link')
-            self.bodies[number] = body_of(model, number) if shape is None else shape
+            self.bodies[number] = body_of(model, number, tolerance) if shape is None else shape
         # MuJoCo has no contact between what stands still and what is led by mocap: there the foam has its law's
         # pressure
         still = model.body_dofnum[model.body_weldid] == 0
@@ -524,6 +529,7 @@ def dress(
     sites=None,
     unit="m",
     mode="sense",
+    tolerance=None,
     readout="as_built",
     seed=0,
     **foam,
@@ -567,7 +573,7 @@ def dress(
         its normal. A box, an ellipsoid or a cylinder gives the area.
     unit : "m", "cm" or "mm"
         Unit of the lengths in `taxels`; areas are in its square.
-    mode : str
+    mode, tolerance
         As of `attach`.
     readout, seed
         As of `spts.Wire`; wire k has the seed `seed` + k.
@@ -631,7 +637,7 @@ def dress(
         dressed.append((link, skin, bodies))
         for body in bodies:
             if body not in shapes:
-                shapes[body] = _body(model, body, meshes)
+                shapes[body] = _body(model, body, meshes, tolerance)
     if bare:
         text = f"links that lie inside others, or that nothing may touch, wear no skin: {', '.join(bare)}"
         if not every or not dressed:
@@ -1163,23 +1169,26 @@ def step(*attachments):
     return [attachment.last for attachment in attachments]
 
 
-def body_of(model, body):
+def body_of(model, body, tolerance=None):
     """`spts.Body` of a body of a model: its geoms that collide, or all of them when none does.
 
     Parameters
     ----------
     model : mujoco.MjModel
     body : str or int
+    tolerance : float, optional
+        By how much the surface of meshes may err, m, for a faster touch; default 0. What all is planes, spheres, capsules,
+        cylinders, boxes and ellipsoids does not err.
 
     Raises
     ------
     ValueError
         For a body without a geom, and for SDFs, which have no mesh.
     """
-    return _body(model, _number(model, mujoco.mjtObj.mjOBJ_BODY, "body", body), {})
+    return _body(model, _number(model, mujoco.mjtObj.mjOBJ_BODY, "body", body), {}, tolerance)
 
 
-def _body(model, body, meshes):
+def _body(model, body, meshes, tolerance):
     """As `body_of`; `meshes` holds those of geoms that are known."""
     geoms = np.flatnonzero(model.geom_bodyid == body)
     geoms = _colliding(model, geoms) or geoms.tolist()
@@ -1193,7 +1202,8 @@ def _body(model, body, meshes):
         first += len(points)
     shapes = [_shape(model, geom) for geom in geoms]
     shapes = shapes if all(shapes) else []
-    return Body.from_vertices(np.concatenate(vertices), np.concatenate(faces), parts=shapes)
+    vertices, faces = np.concatenate(vertices), np.concatenate(faces)
+    return Body.from_vertices(vertices, faces, parts=shapes, tolerance=None if shapes else tolerance)
 
 
 def _shape(model, geom):

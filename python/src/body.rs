@@ -20,6 +20,9 @@ pub(crate) struct Body {
     pub(crate) body: TouchBody,
     /// Stiffness of its surface, Pa/m.
     pub(crate) stiffness_pa_per_m: f64,
+    /// How far its surface is at most from that of the mesh that was given, m: as `tolerance` allowed.
+    #[pyo3(get, name = "error")]
+    error_m: f64,
 }
 
 /// Rings and segments of a ball.
@@ -44,6 +47,17 @@ fn cap(radius_m: f64, z_m: f64) -> impl DoubleEndedIterator<Item = [f64; 2]> {
 }
 
 impl Body {
+    /// `mesh`, with fewer triangles if its surface may err by `tolerance` metres.
+    fn simpler(mesh: TriMesh, tolerance: Option<f64>) -> PyResult<(TriMesh, f64)> {
+        let Some(tolerance_m) = tolerance else {
+            return Ok((mesh, 0.0));
+        };
+        if !(0.0..=1.0).contains(&tolerance_m) {
+            bail!("`tolerance` = {tolerance_m} is outside [0, 1] m");
+        }
+        Ok(mesh.within(tolerance_m).unwrap_or((mesh, 0.0)))
+    }
+
     fn new(mesh: TriMesh, parts: Vec<Part>, stiffness: Option<f64>) -> PyResult<Self> {
         let stiffness_pa_per_m = stiffness.unwrap_or(f64::INFINITY);
         if !(1e4..=f64::INFINITY).contains(&stiffness_pa_per_m) {
@@ -51,7 +65,7 @@ impl Body {
         }
         let mesh = PreparedMesh::from(mesh);
         let body = if parts.is_empty() { mesh.into() } else { TouchBody::of_parts(mesh, parts) };
-        Ok(Self { body, stiffness_pa_per_m })
+        Ok(Self { body, stiffness_pa_per_m, error_m: 0.0 })
     }
 
     /// One convex shape in its own axes, with the mesh of its surface.
@@ -68,8 +82,9 @@ impl Body {
     /// `repair` says what is done with a mesh that is not closed. "strict": it is closed where that is clear, used as
     /// it is where no hole shows from below (-z), and refused otherwise. "near_side": it is used as it is, as a shell
     /// without thickness. With `centre`, its origin becomes the middle of its footprint. A warning names every repair.
+    /// With `tolerance`, its surface may err by so many metres, for fewer triangles: `error` says by how much it does.
     #[staticmethod]
-    #[pyo3(signature = (path, scale = 1.0, stiffness = None, repair = "strict", centre = false))]
+    #[pyo3(signature = (path, scale = 1.0, stiffness = None, repair = "strict", centre = false, tolerance = None))]
     fn from_mesh(
         py: Python<'_>,
         path: PathBuf,
@@ -77,6 +92,7 @@ impl Body {
         stiffness: Option<f64>,
         repair: &str,
         centre: bool,
+        tolerance: Option<f64>,
     ) -> PyResult<Self> {
         if !(scale > 0.0 && scale <= 1e3) {
             bail!("`scale` = {scale} is outside (0, 1000]");
@@ -90,7 +106,8 @@ impl Body {
         for note in report.notes() {
             warn(py, &note)?;
         }
-        Self::new(mesh, Vec::new(), stiffness)
+        let (mesh, error_m) = Self::simpler(mesh, tolerance)?;
+        Ok(Self { error_m, ..Self::new(mesh, Vec::new(), stiffness)? })
     }
 
     /// Body from `vertices` (V, 3) in metres and `faces` (F, 3), counter-clockwise seen from outside. Faces that run
@@ -98,15 +115,16 @@ impl Body {
     ///
     /// `parts` are the convex shapes that it is made of, if they are known: (kind, size (3,), position (3,), rotation
     /// matrix (9,)), with the kinds and sizes of MuJoCo's geoms. On skins that are not flat they press in place of the
-    /// mesh.
+    /// mesh. `tolerance` is as of `from_mesh`.
     #[staticmethod]
-    #[pyo3(signature = (vertices, faces, stiffness = None, parts = Vec::new()))]
+    #[pyo3(signature = (vertices, faces, stiffness = None, parts = Vec::new(), tolerance = None))]
     fn from_vertices(
         py: Python<'_>,
         vertices: PyArrayLike2<'_, f64, AllowTypeChange>,
         faces: PyArrayLike2<'_, i64, AllowTypeChange>,
         stiffness: Option<f64>,
         parts: Vec<PartIn>,
+        tolerance: Option<f64>,
     ) -> PyResult<Self> {
         let vertices = triples("vertices", &vertices)?;
         if faces.shape()[1] != 3 || faces.shape()[0] == 0 || vertices.is_empty() {
@@ -135,7 +153,8 @@ impl Body {
             mesh = mesh.flipped();
         }
         let parts = parts.into_iter().map(part).collect::<PyResult<_>>()?;
-        Self::new(mesh, parts, stiffness)
+        let (mesh, error_m) = Self::simpler(mesh, tolerance)?;
+        Ok(Self { error_m, ..Self::new(mesh, parts, stiffness)? })
     }
 
     /// Ball of `radius` metres, its origin in its middle.
@@ -198,15 +217,28 @@ impl Body {
 
     /// The same body once more: a key of its own for a second pose.
     fn copy(&self) -> Self {
-        Self { body: self.body.clone(), stiffness_pa_per_m: self.stiffness_pa_per_m }
+        Self { body: self.body.clone(), ..*self }
     }
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyAny>, Bound<'py, PyTuple>)> {
         let py = slf.py();
         let (body, (vertices, faces)) = (slf.get(), slf.get().mesh(py)?);
         let parts: Vec<PartIn> = body.body.parts().iter().map(part_out).collect();
-        let arguments = (vertices, faces, body.stiffness_pa_per_m, parts).into_pyobject(py)?;
-        Ok((slf.get_type().getattr("from_vertices")?, arguments))
+        let arguments = (vertices, faces, body.stiffness_pa_per_m, parts, body.error_m).into_pyobject(py)?;
+        Ok((slf.get_type().getattr("_restored")?, arguments))
+    }
+
+    /// The body that was pickled.
+    #[staticmethod]
+    fn _restored(
+        py: Python<'_>,
+        vertices: PyArrayLike2<'_, f64, AllowTypeChange>,
+        faces: PyArrayLike2<'_, i64, AllowTypeChange>,
+        stiffness: f64,
+        parts: Vec<PartIn>,
+        error_m: f64,
+    ) -> PyResult<Self> {
+        Ok(Self { error_m, ..Self::from_vertices(py, vertices, faces, Some(stiffness), parts, None)? })
     }
 
     /// Number of triangles.

@@ -27,7 +27,25 @@ impl TriMesh {
     /// error is measured, not estimated: the largest distance from any vertex of the original to the new surface, and
     /// from seven points on each new triangle (beside its corners, which are the original's) to the original.
     pub(super) fn decimated(&self) -> Option<(Self, f64)> {
-        let limit_m = MAX_DECIMATION_ERROR_M.min(MAX_ERROR_FRACTION * self.extent_m());
+        self.reduced(SOFT_MAX_TRIANGLES, MAX_DECIMATION_ERROR_M.min(MAX_ERROR_FRACTION * self.extent_m()))
+    }
+
+    /// A mesh of fewer triangles whose surface is within `tolerance_m` of this one's, and its error, m; `None` when that
+    /// saves nothing. The error is measured: the largest distance from any vertex of this mesh to the new surface, and
+    /// from seven points on each new triangle to this one.
+    ///
+    /// ```
+    /// use spts_contact::mesh::sphere;
+    ///
+    /// let ball = sphere(20e-3, 96, 192);
+    /// let (coarse, error_m) = ball.within(0.2e-3).expect("a fine ball");
+    /// assert!(error_m <= 0.2e-3 && 20 * coarse.triangles.len() < ball.triangles.len());
+    /// ```
+    pub fn within(&self, tolerance_m: f64) -> Option<(Self, f64)> {
+        self.reduced(4, tolerance_m)
+    }
+
+    fn reduced(&self, triangles: usize, limit_m: f64) -> Option<(Self, f64)> {
         let coarse = (self.triangles.len() > 2 * COARSE_TRIANGLES)
             .then(|| self.simplified(COARSE_TRIANGLES, COARSE_SHARE * limit_m));
         let original = Nearest::new(self);
@@ -38,7 +56,7 @@ impl TriMesh {
         for start in coarse.iter().chain([self]) {
             let mut target_m = limit_m;
             for _ in 0..TRIALS {
-                let mesh = start.simplified(SOFT_MAX_TRIANGLES, target_m);
+                let mesh = start.simplified(triangles, target_m);
                 if mesh.triangles.is_empty()
                     || mesh.triangles.len() >= self.triangles.len()
                     || mesh.open_edges() > open_edges

@@ -60,8 +60,8 @@ struct Near {
     middle_m: Vector,
     /// Distance up to which it was looked for points, m.
     reach_m: f64,
-    /// Places of the columns in the tree, and the columns themselves.
-    columns: Vec<usize>,
+    /// Numbers of the columns' points, and the columns themselves.
+    columns: Vec<u32>,
     beams: Beams,
     /// What they may meet of a mesh.
     groups: Vec<Group>,
@@ -76,10 +76,11 @@ const KNOWN: usize = 32;
 /// still costs the same within the noise; what moves is looked for less often with a larger one.
 const MARGIN: f64 = 0.3;
 
-/// The columns under the points of a skin, neighbours together, in a tree of balls around them.
+/// The points of a skin, neighbours together, in a tree of balls around them.
 #[derive(Debug, Clone)]
 struct Tree {
-    columns: Vec<Column>,
+    /// Their numbers.
+    order: Vec<u32>,
     /// Each before those below it.
     nodes: Vec<Node>,
 }
@@ -87,9 +88,10 @@ struct Tree {
 /// Neighbouring points, and a ball and a box around them.
 #[derive(Debug, Clone)]
 struct Node {
-    columns: Range<usize>,
+    /// Its points, in the tree's order.
+    points: Range<u32>,
     /// Number of the next node that is not below this one.
-    after: usize,
+    after: u32,
     centre_m: Vector,
     radius_m: f64,
     /// Half sides of the box, m.
@@ -103,50 +105,51 @@ const LEAF: usize = LANES;
 
 impl Tree {
     fn of(points: &SurfacePoints) -> Self {
-        let column = |k: usize| {
-            let [point, normal] = [points.positions_m[k], points.normals[k]].map(Vector::from);
-            Column::new(k, point, normal, points.areas_m2[k], 0.0)
-        };
-        let mut tree = Self { columns: (0..points.len()).map(column).collect(), nodes: Vec::new() };
-        tree.divide(0..points.len());
+        let mut tree = Self { order: (0..).take(points.len()).collect(), nodes: Vec::new() };
+        tree.divide(points, 0..points.len());
+        tree.nodes.shrink_to_fit();
         tree
     }
 
-    /// Adds a node with these columns and, if they are many, one for either half along the longest side of the box
+    /// Adds a node with these points and, if they are many, one for either half along the longest side of the box
     /// around them.
-    fn divide(&mut self, range: Range<usize>) {
-        let columns = &mut self.columns[range.clone()];
-        let [low, high] = span(columns.iter().map(|c| c.point_m.into())).map(Vector::from);
+    #[expect(clippy::cast_possible_truncation, reason = "a skin has at most 2^24 points")]
+    fn divide(&mut self, points: &SurfacePoints, range: Range<usize>) {
+        let order = &mut self.order[range.clone()];
+        let at = |k: u32| points.positions_m[k as usize];
+        let [low, high] = span(order.iter().map(|k| at(*k))).map(Vector::from);
         let (centre_m, half_m) = (0.5 * (low + high), 0.5 * (high - low));
-        let radius_m = columns.iter().map(|c| (c.point_m - centre_m).length()).fold(0.0, f64::max);
-        let side_m = columns.iter().map(|c| c.area_m2).fold(0.0, f64::max).sqrt();
+        let radius_m = order.iter().map(|k| (Vector::from(at(*k)) - centre_m).length()).fold(0.0, f64::max);
+        let side_m = order.iter().map(|k| points.areas_m2[*k as usize]).fold(0.0, f64::max).sqrt();
         let number = self.nodes.len();
-        self.nodes.push(Node { columns: range.clone(), after: number + 1, centre_m, radius_m, half_m, side_m });
-        if columns.len() <= LEAF {
-            columns.sort_unstable_by_key(|c| c.index);
+        let (own, after) = (range.start as u32..range.end as u32, number as u32 + 1);
+        self.nodes.push(Node { points: own, after, centre_m, radius_m, half_m, side_m });
+        if order.len() <= LEAF {
+            order.sort_unstable();
             return;
         }
         let axis = (0..3).max_by(|a, b| half_m[*a].total_cmp(&half_m[*b])).unwrap_or(0);
         // those at one place in the order of their numbers, so that it does not depend on how they are sorted
-        let half = columns.len() / 2;
-        columns.select_nth_unstable_by(half, |a, b| {
-            a.point_m[axis].total_cmp(&b.point_m[axis]).then(a.index.cmp(&b.index))
-        });
-        self.divide(range.start..range.start + half);
-        self.divide(range.start + half..range.end);
-        self.nodes[number].after = self.nodes.len();
+        let half = order.len() / 2;
+        order.select_nth_unstable_by(half, |a, b| at(*a)[axis].total_cmp(&at(*b)[axis]).then(a.cmp(b)));
+        self.divide(points, range.start..range.start + half);
+        self.divide(points, range.start + half..range.end);
+        self.nodes[number].after = self.nodes.len() as u32;
     }
 
-    /// Calls `see` with the columns of every node that is not far and has no others below it, and the place of the
-    /// first in the tree, until it returns `true`; whether it did.
-    fn visit(&self, is_far: impl Fn(&Node) -> bool, mut see: impl FnMut(usize, &[Column]) -> bool) -> bool {
+    /// Calls `see` with the points of every node that is not far and has no others below it, until it returns `true`;
+    /// whether it did.
+    fn visit(&self, is_far: impl Fn(&Node) -> bool, mut see: impl FnMut(&[u32]) -> bool) -> bool {
         let mut number = 0;
-        while let Some(node) = self.nodes.get(number) {
+        while let Some(node) = self.nodes.get(number as usize) {
             number += 1;
             if is_far(node) {
                 number = node.after;
-            } else if node.after == number && see(node.columns.start, &self.columns[node.columns.clone()]) {
-                return true;
+            } else if node.after == number {
+                let Range { start, end } = node.points;
+                if see(&self.order[start as usize..end as usize]) {
+                    return true;
+                }
             }
         }
         false
@@ -210,8 +213,8 @@ impl SurfaceField {
             let reach_m = node.radius_m + 1.5 * (h + node.side_m);
             (place - node.centre_m).length_squared() > reach_m * reach_m
         };
-        self.tree.visit(is_far, |_, columns| {
-            columns.iter().any(|c| {
+        self.tree.visit(is_far, |points| {
+            points.iter().map(|k| column(&self.points, *k)).any(|c| {
                 let (away, normal) = (place - c.point_m, c.normal);
                 // within the side of a square of the point's area: what touches right on the rim is on the foam;
                 // between points of a round skin, the surface is off their planes
@@ -253,7 +256,7 @@ impl SurfaceField {
         let Near { columns, beams, groups, depths_m, .. } = &mut self.nearby[k];
         standing.fronts_m(beams, groups, h, gap_m, depths_m);
         let there = columns.iter().zip(depths_m).filter(|(_, depth_m)| **depth_m > f64::NEG_INFINITY);
-        out.extend(there.map(|(place, depth_m)| Column { depth_m: *depth_m, ..self.tree.columns[*place] }));
+        out.extend(there.map(|(k, depth_m)| Column { depth_m: *depth_m, ..column(&self.points, *k) }));
     }
 
     /// Which of `self.nearby` has the columns whose points may be within `reach_m` of a body.
@@ -292,20 +295,21 @@ impl SurfaceField {
         let (reach_m, is_mesh) = (near.reach_m, standing.parts().is_empty());
         self.tree.visit(
             |node| standing.is_far(node.centre_m, node.radius_m, node.half_m, reach_m),
-            |first, columns| {
+            |points| {
                 let begin = near.columns.len();
                 let base_m = |c: &Column| c.point_m - c.normal * self.config.thickness_m;
-                for (k, c) in columns.iter().enumerate() {
+                let columns = || points.iter().map(|k| column(&self.points, *k));
+                for (k, c) in points.iter().zip(columns()) {
                     if is_mesh || !standing.is_far(c.point_m, 0.0, Vector::ZERO, reach_m) {
-                        near.columns.push(first + k);
-                        near.beams.push(base_m(c), c.normal);
+                        near.columns.push(*k);
+                        near.beams.push(base_m(&c), c.normal);
                     }
                 }
                 if is_mesh {
-                    let middles = [|c: &Column, _| c.point_m, |c: &Column, h| c.point_m - c.normal * h].map(|of| {
-                        let points = || columns.iter().map(|c| of(c, self.config.thickness_m));
-                        let middle_m = points().sum::<Vector>() / columns.len() as f64;
-                        (middle_m, points().map(|at| (at - middle_m).length()).fold(0.0, f64::max))
+                    let middles = [0.0, self.config.thickness_m].map(|h| {
+                        let places = || columns().map(|c| c.point_m - c.normal * h);
+                        let middle_m = places().sum::<Vector>() / points.len() as f64;
+                        (middle_m, places().map(|at| (at - middle_m).length()).fold(0.0, f64::max))
                     });
                     let radius_m = middles[0].1.max(middles[1].1);
                     let lanes = begin..near.columns.len();
@@ -320,8 +324,9 @@ impl SurfaceField {
 
     /// The column nearest to a place, m.
     pub(crate) fn column_at(&self, place_m: Vector) -> Option<Column> {
-        let away = |c: &Column| (c.point_m - place_m).length_squared();
-        self.tree.columns.iter().min_by(|a, b| away(a).total_cmp(&away(b)).then(a.index.cmp(&b.index))).copied()
+        let away = |k: usize| (Vector::from(self.points.positions_m[k]) - place_m).length_squared();
+        let nearest = (0..self.points.len()).min_by(|a, b| away(*a).total_cmp(&away(*b)))?;
+        Some(column(&self.points, u32::try_from(nearest).ok()?))
     }
 
     /// Adds the pressures of `columns` at their depths to those since [`SurfaceField::clear`].
@@ -356,7 +361,7 @@ impl SurfaceField {
             if depth_m <= 0.0 {
                 continue;
             }
-            let Column { index, point_m, normal, area_m2, .. } = self.tree.columns[*place];
+            let Column { index, point_m, normal, area_m2, .. } = column(&self.points, *place);
             self.bottomed |= depth_m > c.thickness_m;
             let arm = point_m - normal * depth_m - centre;
             let velocity = Vector::from(velocity_at(body, arm.into()));
@@ -371,6 +376,13 @@ impl SurfaceField {
         }
         Wrench { force_n: force.into(), torque_nm: torque.into() }
     }
+}
+
+/// The column under a point, without a depth.
+#[inline]
+fn column(points: &SurfacePoints, number: u32) -> Column {
+    let k = number as usize;
+    Column::new(k, points.positions_m[k].into(), points.normals[k].into(), points.areas_m2[k], 0.0)
 }
 
 /// Adds `p` to the pressure of a point, and the point to those that have one.
