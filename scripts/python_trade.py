@@ -154,6 +154,7 @@ def main():
                 "mode": kind[2],
                 "tolerance": kind[3],
                 "triangles": setups[kind].body.triangles if kind[0] != "ball" else 0,
+                "touched": round(rested[kind][0].area * (kind[1] / PITCH) ** 2),
                 "us": [float(np.percentile(times[kind], p)) for p in (50, 99)],
                 "pressure": [float(np.median(pressure)), max(pressure)],
                 "force": float(max(sums)),
@@ -163,8 +164,10 @@ def main():
     if chosen.json:
         print(json.dumps(found, indent=2))
         return
-    print("| shape | points a taxel | mode | `tolerance` | step, us, p50 / p99 | pressure | force | image |")
-    print("|---|---|---|---|---|---|---|---|")
+    print(
+        "| shape | points a taxel | mode | `tolerance` | points touched | step, µs, p50 / p99 | pressure | force | image |"
+    )
+    print("|---|---|---|---|---|---|---|---|---|")
     for row in found:
         faces = f", {row['triangles']} triangles" if row["triangles"] else ""
         tolerance = f"{1e3 * row['tolerance']:g} mm" if row["tolerance"] else "-"
@@ -176,7 +179,7 @@ def main():
             ]
         )
         print(
-            f"| {row['shape']}{faces} | {row['points']} | {row['mode']} | {tolerance} "
+            f"| {row['shape']}{faces} | {row['points']} | {row['mode']} | {tolerance} | {row['touched']} "
             f"| {row['us'][0]:.0f} / {row['us'][1]:.0f} | {errors} |"
         )
 

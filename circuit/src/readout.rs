@@ -424,13 +424,13 @@ mod tests {
     fn taxels_that_conduct_nothing_add_nothing() {
         for profile in &with_everything() {
             for mode in [Mode::Raster, Mode::Compressive] {
-                let conducting = [3_usize, 4, 5, 41, 97];
+                let conducting = [3_u32, 4, 5, 41, 97];
                 let mut readouts =
                     [0; 2].map(|_| Readout::new(profile, mode, &SkinLayout::default(), Streams::new(8), 0).unwrap());
                 let mut some = crate::Constant::new(ConductanceMap::zeros(10, 10)).unwrap();
                 for k in 0..3_u32 {
-                    let values = conducting.map(|taxel| (taxel, 1e-5 * f64::from(k * (taxel as u32 % 7))));
-                    some.change(values, conducting.map(|taxel| taxel as u32)).unwrap();
+                    let values = conducting.map(|taxel| (taxel as usize, 1e-5 * f64::from(k * (taxel % 7))));
+                    some.change(values, conducting).unwrap();
                     let mut all = crate::Constant::new(some.map().clone()).unwrap();
                     let sources: [&mut dyn ConductanceSource; 2] = [&mut some, &mut all];
                     let mut found = readouts.iter_mut().zip(sources).map(|(readout, source)| {

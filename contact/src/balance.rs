@@ -56,10 +56,10 @@ pub(crate) struct Balance {
 impl Balance {
     /// Depths of `columns`, m, at which they carry `force_n`, with the resultant on the load's axis where that can be.
     ///
-    /// The body keeps its shape: it sinks by s and tilts by (a, b), so that a column at (u, v) has the depth d + s + a u
-    /// + b v. With the pressure p of the foam's law, Σ A p = F, Σ A p u = 0 and Σ A p v = 0: the minimum of the convex
-    /// potential Σ A ∫p dd − F s, by Newton's method. A load whose axis is beside all columns has none; then the body
-    /// sinks without a tilt. The force is met to 1e-12 of it in either case.
+    /// The body keeps its shape: it sinks by s and tilts by (a, b), so that a column at (u, v) has the depth
+    /// d + s + a u + b v. With the pressure p of the foam's law, Σ A p = F, Σ A p u = 0 and Σ A p v = 0: the minimum of the
+    /// convex potential Σ A ∫p dd − F s, by Newton's method. A load whose axis is beside all columns has none; then the
+    /// body sinks without a tilt. The force is met to 1e-12 of it in either case.
     pub(crate) fn settle(&mut self, law: &FoamLaw, columns: &mut [Column], force_n: f64) {
         // roughly, by some of them: the tilt begins there, and meets force and moments itself
         let every = (columns.len() / SAMPLE).max(1);

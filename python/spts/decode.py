@@ -14,7 +14,7 @@ DEFAULT = "auto"
 # Decoders that learn from images without labels.
 _TAUGHT = {name for name, _, needs in decoder_table() if needs == "images"} | {"mixture"}
 # Most taxels of a decoder.
-_MOST_TAXELS = 2048
+MOST_TAXELS = 2048
 # Half sizes of the touches of a prior: the least as a share of the pitch, the most as a share of the skin's extent.
 _LEAST, _MOST = 0.35, 0.25
 # Scatter of the gains of a skin's taxels, as standard deviation of the logarithm.
@@ -133,9 +133,25 @@ def learned(decoder, skin, images=None, labels=None):
     if images is not None:
         return Decoder(decoder, shape, images, labels)
     # what cannot be is refused there
-    if decoder not in _TAUGHT or not 1 <= shape[0] * shape[1] <= _MOST_TAXELS:
+    if decoder not in _TAUGHT or not 1 <= shape[0] * shape[1] <= MOST_TAXELS:
         return _untaught(decoder, shape)
     return _taught(decoder, shape, *_key(skin if isinstance(skin, Skin) else shape))
+
+
+def learned_of(decoder, parts, count=3000):
+    """A decoder for taxels in a row that has learned from touches of one part at a time. A part has the numbers of its
+    taxels, their places and their normals."""
+    taxels = sum(len(numbers) for numbers, *_ in parts)
+    if decoder == DEFAULT:
+        decoder = auto_decoder(1, taxels)
+    if decoder not in _TAUGHT:
+        return _untaught(decoder, (1, taxels))
+    images = []
+    for k, (numbers, places, normals) in enumerate(parts):
+        share = np.zeros((max(1, round(count * len(numbers) / taxels)), taxels))
+        share[:, numbers] = _touches(places, normals, len(share), k)
+        images.append(share)
+    return Decoder(decoder, (1, taxels), np.concatenate(images))
 
 
 @functools.lru_cache(maxsize=32)

@@ -23,12 +23,14 @@ import ctypes
 import difflib
 import fnmatch
 import math
+import time
 import warnings
 
 import mujoco
 import numpy as np
 
 from ._spts import Body, Mount, Mounts, Skin, Wire
+from .decode import MOST_TAXELS, learned_of
 from .taxels import Table, areas_of, nearest, places_of, tables
 
 # Most times that a step is solved anew with the foam's law about another velocity, and the share of a force that may be
@@ -93,15 +95,15 @@ def attach(
         place = int(model.site_bodyid[site]), model.site_pos[site], model.site_quat[site]
     else:
         place = _number(model, mujoco.mjtObj.mjOBJ_BODY, "body", body), pos, quat
-    return Attachment(
-        model, data, skin, *place, bodies=bodies, link_geoms=link_geoms, mode=mode, tolerance=tolerance
-    )
+    return Attachment(model, data, skin, *place, bodies=bodies, link_geoms=link_geoms, mode=mode, tolerance=tolerance)
 
 
 class Attachment:
     """A skin on a link of a model: what `attach` returns."""
 
-    def __init__(self, model, data, skin, link, pos, quat, *, bodies="all", link_geoms=None, mode="sense", tolerance=None):
+    def __init__(
+        self, model, data, skin, link, pos, quat, *, bodies="all", link_geoms=None, mode="sense", tolerance=None
+    ):
         if mode not in ("sense", "foam"):
             raise ValueError(f'`mode` = "{mode}"; valid: "sense", "foam"')
         self.mode = mode
@@ -829,8 +831,8 @@ def _sites(model, pattern):
 
 
 def _wires(model, links, skins, wires, readout, seed, labels=()):
-    """Wires over the skins of links, and the numbers of the links of each; None for a wire of one touch. `labels` are the
-    wires of all taxels, an array a link, where a file says them.
+    """Wires over the skins of links, and of each the numbers of its links, or the only one's, and its taxels among theirs,
+    None for all. `labels` are the wires of all taxels, an array a link, where a file says them.
     """
     if wires is None:
         return [], []
@@ -844,10 +846,11 @@ def _wires(model, links, skins, wires, readout, seed, labels=()):
             skipped = (np.cumsum(counts) - counts)[group] - (np.cumsum(counts[group]) - counts[group])
             taxels = (numbers - skipped[of]).tolist()
             made.append(Wire([skins[k] for k in group], readout, seed=seed + len(made), taxels=taxels))
-            wired.append(group.tolist())
+            wired.append((group.tolist(), taxels))
         return made, wired
     if isinstance(wires, str) and wires == "link":
-        return [Wire(skin, readout, seed=seed + k) for k, skin in enumerate(skins)], [None] * len(skins)
+        made = [Wire(skin, readout, seed=seed + k) for k, skin in enumerate(skins)]
+        return made, [(k, None) for k in range(len(skins))]
     counts = np.array([skin.shape[0] * skin.shape[1] for skin in skins])
     ends = np.cumsum(counts)
     if isinstance(wires, str):
@@ -868,7 +871,15 @@ def _wires(model, links, skins, wires, readout, seed, labels=()):
         Wire([skins[k] for k in group], readout, seed=seed + wire, taxels=taxels)
         for wire, (group, taxels) in enumerate(groups)
     ]
-    return made, [group for group, _ in groups]
+    return made, groups
+
+
+def _places(links, among, attachments):
+    """Link and number there of every taxel of a wire: `among` are its taxels among those of `links`, None for all."""
+    links = [links] if np.isscalar(links) else links
+    counts = [len(attachments[k].skin.areas) for k in links]
+    every = np.repeat(links, counts), np.concatenate([np.arange(n) for n in counts])
+    return every if among is None else tuple(part[np.asarray(among)] for part in every)
 
 
 def _limbs(model, links):
@@ -901,7 +912,10 @@ class Dress:
         self.attachments = attachments
         #: The wires: one a link in the same order, one a limb, or as many as were asked for; empty without wires.
         self.wires = wires
-        self._wired = wired
+        #: Where the taxels of every wire are, in its order: number of the link (taxels,), and of the taxel there (taxels,).
+        self.places = [_places(group, taxels, attachments) for group, taxels in wired]
+        self._wired = [group for group, *_ in wired]
+        self._decoders, self._spent = {}, {}
         #: Names of the links.
         self.names = names
         #: Numbers of the rows of the file that the taxels of every link come from, (taxels,) of int; empty by pitch.
@@ -924,19 +938,20 @@ class Dress:
         """The last touch of every link; None before the first step."""
         return [attachment.last for attachment in self.attachments]
 
-    def record(self, measurements):
+    def record(self, measurements, weights=True):
         """Measures the last touches with every wire.
 
         Parameters
         ----------
         measurements : int
             Number of measurements of each wire, M.
+        weights : bool
+            As of `spts.Wire.record`: without them a touched taxel costs time, and an untouched one does not.
 
         Returns
         -------
-        list of (ndarray (M,), ndarray (M, taxels))
-            As `spts.Wire.record` gives them, a pair a wire. The taxels of a wire are those of its links one after the
-            other.
+        list of (ndarray (M,), ndarray (M, taxels) or None)
+            As `spts.Wire.record` gives them, a pair a wire. `places` says where the taxels of a wire are.
 
         Raises
         ------
@@ -947,8 +962,70 @@ class Dress:
             raise ValueError('`wires` = None: `dress(..., wires="link")` gives wires that can be recorded')
         # before the first step nothing has touched it
         touches = [skin.touch({}) if last is None else last for skin, last in zip(self.skins, self.touches)]
-        felt = [touches[k] if group is None else [touches[i] for i in group] for k, group in enumerate(self._wired)]
-        return [wire.record(touch, measurements) for wire, touch in zip(self.wires, felt)]
+        felt = [touches[group] if np.isscalar(group) else [touches[i] for i in group] for group in self._wired]
+        return [wire.record(touch, measurements, weights=weights) for wire, touch in zip(self.wires, felt)]
+
+    def decode(self, measured, deadline=None, decoder="auto"):
+        """Images of what the wires have measured: the best that there are after `deadline` seconds.
+
+        At first every wire has the image max(0, Φᵀy/M). Then the wires are decoded, those with the largest signals
+        first, as long as the time is likely to suffice: a wire takes as long as it took before. The first call learns
+        the decoders, which may take seconds a wire: make it before the loop, without a deadline. With one, which wires
+        are decoded depends on the machine.
+
+        Parameters
+        ----------
+        measured : list of (ndarray (M,), ndarray (M, taxels))
+            As `record` gives it.
+        deadline : float, optional
+            Time that the call may take, s; default: until all wires are decoded.
+        decoder : str
+            As of `spts.decode`.
+
+        Returns
+        -------
+        list of (ndarray (taxels,), bool)
+            A wire's image in the unit of its measurements, and whether it is the decoder's.
+
+        Raises
+        ------
+        ValueError
+            For another number of wires, and for a wire of more than 2,048 taxels: more wires have fewer.
+
+        ::
+
+            robot.decode(robot.record(40))                       # learns
+            for _ in range(1000):
+                robot.step()
+                images = robot.decode(robot.record(40), deadline=5e-4)
+        """
+        begin = time.perf_counter()
+        if len(measured) != len(self.wires):
+            raise ValueError(f"`measured` has {len(measured)} entries; {len(self.wires)} are needed, one a wire")
+        images = [(np.maximum(y @ phi / len(y), 0.0), False) for y, phi in measured]
+        order = sorted(range(len(measured)), key=lambda k: -float(measured[k][0] @ measured[k][0]))
+        for k in order:
+            left = math.inf if deadline is None else deadline - (time.perf_counter() - begin)
+            if self._spent.get((k, decoder), 0.0) > left or left <= 0.0:
+                continue
+            learned, now = self._decoder(k, decoder), time.perf_counter()
+            y, phi = measured[k]
+            images[k] = learned.decode(phi, y).ravel(), True
+            self._spent[k, decoder] = time.perf_counter() - now
+        return images
+
+    def _decoder(self, wire, name):
+        """The decoder of a wire, which has learned from touches anywhere on one of its links."""
+        if (wire, name) not in self._decoders:
+            links, taxels = self.places[wire]
+            if len(links) > MOST_TAXELS:
+                raise ValueError(
+                    f"wire {wire} has {len(links)} taxels; decoders know the places of {MOST_TAXELS} at most: more `wires`"
+                )
+            parts = [(np.flatnonzero(links == k), self.skins[k]) for k in np.unique(links)]
+            parts = [(of, skin.positions[taxels[of]], skin.normals[taxels[of]]) for of, skin in parts]
+            self._decoders[wire, name] = learned_of(name, parts)
+        return self._decoders[wire, name]
 
     def step(self, steps=1):
         """Steps the model, in place of `mujoco.mj_step`; what every link feels."""

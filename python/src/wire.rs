@@ -543,7 +543,7 @@ fn parts(several: bool, skins: &[Bound<'_, Skin>], taxels: Option<Vec<usize>>) -
     let all: Vec<(usize, usize)> =
         layouts.iter().enumerate().flat_map(|(k, layout)| (0..layout.taxels()).map(move |taxel| (k, taxel))).collect();
     let mut seen = vec![false; all.len()];
-    let mut on_wire: Vec<(Vec<(u32, u32)>, Vec<u32>)> = vec![(Vec::new(), Vec::new()); skins.len()];
+    let mut on_wire = vec![(Vec::new(), Vec::new()); skins.len()];
     for (place, taxel) in taxels.unwrap_or_else(|| (0..all.len()).collect()).into_iter().enumerate() {
         match seen.get_mut(taxel) {
             None => bail!("`taxels[{place}]` = {taxel} is outside [0, {}]", all.len() - 1),

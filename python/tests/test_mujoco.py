@@ -736,6 +736,7 @@ def test_a_wire_a_limb(dog):
     assert [phi.shape for _, phi in found] == [(40, w.shape[1]) for w in robot.wires]
     touched = [(w.conductance > 1e-9).any() for w in robot.wires]
     assert touched == [False, True, True, True, True]
+    assert [phi for _, phi in robot.record(4, weights=False)] == [None] * 5
     # a limb's taxels are those of its links one after the other
     foot = robot.skins[robot.names.index("bl_foot")]
     pressed = robot.touches[robot.names.index("bl_foot")].pressure.ravel() > 0.0
@@ -748,6 +749,8 @@ def test_any_number_of_wires(dog, count):
     model, _, each = dog
     robot = spts.mujoco.dress(model, mujoco.MjData(model), pitch=0.02, wires=count)
     sizes = [w.shape[1] for w in robot.wires]
+    every = {(link, taxel) for places in robot.places for link, taxel in zip(*(part.tolist() for part in places))}
+    assert len(every) == robot.taxels and [len(links) for links, _ in robot.places] == sizes
     assert len(sizes) == count and sum(sizes) == robot.taxels == each.taxels
     share = robot.taxels / count
     # both ends of a wire may go to the ends of a link
@@ -755,6 +758,55 @@ def test_any_number_of_wires(dog, count):
     robot.step()
     assert [phi.shape for _, phi in robot.record(3)] == [(3, n) for n in sizes]
     robot.detach()
+
+
+def test_wires_are_decoded_in_time(dog):
+    model, data, _ = dog
+    data = mujoco.MjData(model)
+    robot = spts.mujoco.dress(model, data, pitch=0.03, wires=6, readout="ideal")
+    robot.step(200)
+    measured = robot.record(60)
+    whole = robot.decode(measured)
+    assert [done for _, done in whole] == [True] * 6
+    touched = [k for k, wire in enumerate(robot.wires) if wire.conductance.max() > 1e-6]
+    assert touched
+    for k in touched:
+        assert np.corrcoef(whole[k][0], robot.wires[k].conductance.ravel())[0, 1] > 0.8
+    # no time: what the sums say at once; and the strongest wire is the first
+    at_once = robot.decode(measured, deadline=0.0)
+    assert [done for _, done in at_once] == [False] * 6
+    for (image, _), (y, phi) in zip(at_once, measured):
+        assert np.array_equal(image, np.maximum(y @ phi / 60, 0.0))
+    robot._spent = {key: 0.0 if key[0] == touched[-1] else 1e9 for key in robot._spent}
+    some = robot.decode(measured, deadline=60.0)
+    assert [k for k, (_, done) in enumerate(some) if done] == [touched[-1]]
+    assert np.array_equal(some[touched[-1]][0], whole[touched[-1]][0])
+    with pytest.raises(ValueError, match="6 are needed"):
+        robot.decode(measured[:2])
+    many = spts.mujoco.dress(model, data, pitch=0.006, wires=1)
+    with pytest.raises(ValueError, match="2048 at most"):
+        many.decode(many.record(2))
+    robot.detach()
+
+
+def test_a_deep_contact_is_felt():
+    """The force of MuJoCo's contact is felt however far a soft contact lets the geoms into each other."""
+    model = mujoco.MjModel.from_xml_string("""
+<mujoco><option timestep=".0005" gravity="0 0 0"/><default><geom condim="1" solref="-2000 -50" solimp=".5 .5 .001"/></default>
+<worldbody><body name="arm"><joint type="slide" axis="0 1 0"/><geom type="capsule" fromto="-.2 0 0 .2 0 0" size=".045" mass="3"/>
+</body><body name="chest" pos="0 .18 0"><geom type="capsule" size=".13 .2"/></body></worldbody></mujoco>""")
+    data = mujoco.MjData(model)
+    robot = spts.mujoco.dress(model, data, ["arm"], 0.01, wires=None)
+    deepest = 0.0
+    for k in range(5000):
+        data.xfrc_applied[1, 1] = 0.09 * k
+        touch = robot.step()[0]
+        if data.ncon:
+            felt = touch.pressure.ravel() @ robot.skins[0].areas
+            # the capsule's taxels look in directions of their own: sums of their forces, not of their vectors
+            assert felt >= data.efc_force.sum() * (1 - 1e-9)
+            deepest = min(deepest, data.contact[0].dist)
+    assert deepest < -0.012
 
 
 def test_wires_keep_links_whole():

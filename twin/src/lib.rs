@@ -61,7 +61,7 @@ pub use record::Twin;
 #[cfg(feature = "mujoco")]
 pub use scene::Scene;
 pub use session::{PressFacts, Recorded, Session};
-pub use wire::Wire;
+pub use wire::{Pressed, Wire};
 
 pub use spts_circuit::{Block, FrameUnit, Mode, Profile, Recording, RecordingInfo, Seeding, WeightMode, Weights};
 pub use spts_contact::{Frame, Pose, Wrench};

@@ -9,6 +9,10 @@ use spts_recon::metrics::median;
 /// Measurements of the untouched skin from which its output is known; of a pattern whole rounds.
 const IDLE: usize = 2000;
 
+/// A touch of a skin: the taxels that are pressed, in order, with the pressure on their electrodes, Pa; and for how long,
+/// s.
+pub type Pressed<'a> = (&'a [(u32, f64)], f64);
+
 /// The one wire of a skin: transducer and electronics with their state, fed with one pressure after the other.
 ///
 /// Transducer and clocks keep running between calls, so the result does not depend on how measurements are divided
@@ -105,16 +109,15 @@ impl Wire {
         self.feel_touched(&[Some((&pressed.collect::<Vec<_>>(), dt_s))])
     }
 
-    /// [`Wire::feel`] for every skin: the taxels that are pressed, in order, with their pressure, Pa, and for how long
-    /// that is applied, s. `None` leaves the taxels of a skin as they are. Taxels that are neither pressed nor conduct
-    /// cost nothing.
+    /// [`Wire::feel`] for every skin. `None` leaves the taxels of a skin as they are. Taxels that are neither pressed nor
+    /// conduct cost nothing.
     ///
     /// # Errors
     /// As [`Wire::feel`].
     ///
     /// # Panics
     /// If there are more or fewer than skins, or a skin does not have one of the taxels.
-    pub fn feel_touched(&mut self, felt: &[Option<(&[(u32, f64)], f64)>]) -> Result<(), Refusal> {
+    pub fn feel_touched(&mut self, felt: &[Option<Pressed<'_>>]) -> Result<(), Refusal> {
         assert_eq!(felt.len(), self.skins.len(), "one touch a skin");
         for (worn, felt) in self.skins.iter_mut().zip(felt) {
             if let Some((pressed, dt_s)) = felt {

@@ -257,8 +257,7 @@ impl Effect for LateCells {
                     break;
                 }
                 collision += 1.0;
-                let draw: f64 = self.block.child("row", row).rng("cell", k as u64).random();
-                if draw < cell.late {
+                if self.block.uniform([row, k as u64]) < cell.late {
                     #[expect(clippy::cast_possible_truncation, reason = "less than the batch is long")]
                     let i = (row - first) as usize;
                     let held = batch.previous_level(k, i) - batch.level(k, i);

@@ -330,7 +330,9 @@ impl Transducer for Velostat {
         }
         if loaded != own {
             self.places.fill(0);
-            (self.loaded.clear(), self.plays.clear(), self.slow.clear());
+            self.loaded.clear();
+            self.plays.clear();
+            self.slow.clear();
             for taxel in loaded {
                 self.load(taxel as usize);
             }
