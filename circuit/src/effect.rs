@@ -21,8 +21,8 @@ pub struct EffectSession {
     pub feedback_ohm: f64,
     /// Measurements a second, Hz.
     pub sample_rate_hz: f64,
-    /// Whether what a cell does is drawn from streams of its own: where few of many taxels conduct, the others then cost
-    /// nothing.
+    /// Whether what a cell does is drawn from streams of its own: where few of many taxels conduct, the others then
+    /// cost nothing.
     pub cells_apart: bool,
 }
 

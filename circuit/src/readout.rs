@@ -63,8 +63,8 @@ impl Readout {
     }
 
     /// [`Readout::new`] for sources in which few taxels conduct at a time ([`Segment::fours`](crate::Segment::fours)).
-    /// With more than 1,024 taxels, what a cell does is drawn from streams of its own, so that its noise is another than
-    /// that of [`Readout::new`].
+    /// With more than 1,024 taxels, what a cell does is drawn from streams of its own, so that its noise is another
+    /// than that of [`Readout::new`].
     ///
     /// # Errors
     /// As [`Readout::new`].

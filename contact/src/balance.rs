@@ -37,8 +37,8 @@ const MAX_ITERATIONS: usize = 25;
 /// Numbers that are summed side by side, in an order that is the same on every machine.
 const LANES: usize = 8;
 
-/// The columns under a load, as its balance sees them: depths, m, places across the load, m, and areas, m². Past the last
-/// column, up to whole lanes, there is nothing.
+/// The columns under a load, as its balance sees them: depths, m, places across the load, m, and areas, m². Past the
+/// last column, up to whole lanes, there is nothing.
 #[derive(Debug, Clone, Default)]
 struct Bed {
     depth_m: Vec<f64>,
@@ -57,9 +57,9 @@ impl Balance {
     /// Depths of `columns`, m, at which they carry `force_n`, with the resultant on the load's axis where that can be.
     ///
     /// The body keeps its shape: it sinks by s and tilts by (a, b), so that a column at (u, v) has the depth
-    /// d + s + a u + b v. With the pressure p of the foam's law, Σ A p = F, Σ A p u = 0 and Σ A p v = 0: the minimum of the
-    /// convex potential Σ A ∫p dd − F s, by Newton's method. A load whose axis is beside all columns has none; then the
-    /// body sinks without a tilt. The force is met to 1e-12 of it in either case.
+    /// d + s + a u + b v. With the pressure p of the foam's law, Σ A p = F, Σ A p u = 0 and Σ A p v = 0: the minimum of
+    /// the convex potential Σ A ∫p dd − F s, by Newton's method. A load whose axis is beside all columns has none; then
+    /// the body sinks without a tilt. The force is met to 1e-12 of it in either case.
     pub(crate) fn settle(&mut self, law: &FoamLaw, columns: &mut [Column], force_n: f64) {
         // roughly, by some of them: the tilt begins there, and meets force and moments itself
         let every = (columns.len() / SAMPLE).max(1);
@@ -92,8 +92,8 @@ fn more(a: f64, b: f64) -> f64 {
     if a > b { a } else { b }
 }
 
-/// Σ A p and the sums of A p u and A p v, N and N m, of columns that are shifted by s + a u + b v, and of their slopes A
-/// p′ times 1, u, v, u², u v and v².
+/// Σ A p and the sums of A p u and A p v, N and N m, of columns that are shifted by s + a u + b v, and of their slopes
+/// A p′ times 1, u, v, u², u v and v².
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
 fn sums(law: FoamLaw, bed: &Bed, [s, a, b]: [f64; 3]) -> [f64; 9] {
     let mut lanes = [[0.0; LANES]; 9];

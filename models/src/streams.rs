@@ -37,8 +37,8 @@ impl Streams {
         Self::new(self.rng(label, index).random())
     }
 
-    /// A number in [0, 1) for a pair of items, far cheaper than a generator: SplitMix64 (G. L. Steele, D. Lea, C. H. Flood,
-    /// "Fast splittable pseudorandom number generators", OOPSLA 2014), from the root on.
+    /// A number in [0, 1) for a pair of items, far cheaper than a generator: SplitMix64 (G. L. Steele, D. Lea, C. H.
+    /// Flood, "Fast splittable pseudorandom number generators", OOPSLA 2014), from the root on.
     pub fn uniform(self, items: [u64; 2]) -> f64 {
         let bits = items.into_iter().fold(self.root, |z, item| {
             let z = z.wrapping_add(0x9e37_79b9_7f4a_7c15).wrapping_add(item);

@@ -912,7 +912,7 @@ class Dress:
         self.attachments = attachments
         #: The wires: one a link in the same order, one a limb, or as many as were asked for; empty without wires.
         self.wires = wires
-        #: Where the taxels of every wire are, in its order: number of the link (taxels,), and of the taxel there (taxels,).
+        #: Where the taxels of every wire are, in its order: numbers of the links (taxels,), and of the taxels there.
         self.places = [_places(group, taxels, attachments) for group, taxels in wired]
         self._wired = [group for group, *_ in wired]
         self._decoders, self._spent = {}, {}

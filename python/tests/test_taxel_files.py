@@ -9,7 +9,7 @@ import pytest
 import spts.mujoco
 from spts.taxels import areas_of, nearest
 
-# A ball that lies on its lowest point, with a box fixed beside it, and a frame at the ball's lowest point that looks down.
+# A ball that lies on its lowest point, with a box fixed beside it, and a frame at that point that looks down.
 MODEL = """
 <mujoco><option timestep="0.002"/><asset><mesh name="wedge" vertex=".2 0 0  .3 0 0  .2 .1 0  .2 0 .1"/></asset><worldbody>
   <geom name="floor" type="plane" size="2 2 .1"/>

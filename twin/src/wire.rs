@@ -9,8 +9,8 @@ use spts_recon::metrics::median;
 /// Measurements of the untouched skin from which its output is known; of a pattern whole rounds.
 const IDLE: usize = 2000;
 
-/// A touch of a skin: the taxels that are pressed, in order, with the pressure on their electrodes, Pa; and for how long,
-/// s.
+/// A touch of a skin: the taxels that are pressed, in order, with the pressure on their electrodes, Pa; and for how
+/// long, s.
 pub type Pressed<'a> = (&'a [(u32, f64)], f64);
 
 /// The one wire of a skin: transducer and electronics with their state, fed with one pressure after the other.
@@ -109,8 +109,8 @@ impl Wire {
         self.feel_touched(&[Some((&pressed.collect::<Vec<_>>(), dt_s))])
     }
 
-    /// [`Wire::feel`] for every skin. `None` leaves the taxels of a skin as they are. Taxels that are neither pressed nor
-    /// conduct cost nothing.
+    /// [`Wire::feel`] for every skin. `None` leaves the taxels of a skin as they are. Taxels that are neither pressed
+    /// nor conduct cost nothing.
     ///
     /// # Errors
     /// As [`Wire::feel`].

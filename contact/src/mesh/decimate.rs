@@ -30,9 +30,9 @@ impl TriMesh {
         self.reduced(SOFT_MAX_TRIANGLES, MAX_DECIMATION_ERROR_M.min(MAX_ERROR_FRACTION * self.extent_m()))
     }
 
-    /// A mesh of fewer triangles whose surface is within `tolerance_m` of this one's, and its error, m; `None` when that
-    /// saves nothing. The error is measured: the largest distance from any vertex of this mesh to the new surface, and
-    /// from seven points on each new triangle to this one.
+    /// A mesh of fewer triangles whose surface is within `tolerance_m` of this one's, and its error, m; `None` when
+    /// that saves nothing. The error is measured: the largest distance from any vertex of this mesh to the new surface,
+    /// and from seven points on each new triangle to this one.
     ///
     /// ```
     /// use spts_contact::mesh::sphere;

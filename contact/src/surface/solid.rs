@@ -223,8 +223,8 @@ fn half_space(p: Vector, d: Vector) -> [f64; 2] {
     select(d.z > 0.0, [f64::NEG_INFINITY, at], select(d.z < 0.0, [at, f64::INFINITY], along))
 }
 
-/// How deep a convex shape whose chord is `ends` reaches into a column: [`Standing::front_m`] of one part; −∞ where there
-/// is nothing.
+/// How deep a convex shape whose chord is `ends` reaches into a column: [`Standing::front_m`] of one part; −∞ where
+/// there is nothing.
 #[inline(always)]
 fn front([enter, leave]: [f64; 2], thickness_m: f64, reach_m: f64) -> f64 {
     let (inward_m, there) = (-enter, enter < leave);
@@ -278,8 +278,8 @@ pub(super) const LANES: usize = 8;
 /// Most triangles of a group.
 const MANY: usize = 48;
 
-/// Distance, m, at which each of the beams from `first` on first meets one of `triangles`, which are in the axes of a body,
-/// and whether it enters there (1) or leaves (-1). Infinity where there is none, and past the last beam.
+/// Distance, m, at which each of the beams from `first` on first meets one of `triangles`, which are in the axes of a
+/// body, and whether it enters there (1) or leaves (-1). Infinity where there is none, and past the last beam.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
 fn hits(triangles: &[Triangle], beams: &Beams, first: usize, [axes, origin_m]: [&[Vector; 3]; 2]) -> [[f64; LANES]; 2] {
     let lanes = |values: &[f64]| -> [f64; LANES] {
@@ -472,8 +472,8 @@ impl Standing<'_> {
         }
     }
 
-    /// What columns `lanes` meet while the body moves by less than `margin_m`: all have their points within `radius_m` of
-    /// `centre_m` and their bases as far from `base_m`, and reach within `reach_m` of their points.
+    /// What columns `lanes` meet while the body moves by less than `margin_m`: all have their points within `radius_m`
+    /// of `centre_m` and their bases as far from `base_m`, and reach within `reach_m` of their points.
     pub(super) fn look(
         &self,
         lanes: Range<usize>,

@@ -127,7 +127,7 @@ pub struct Velostat {
     fixed: Vec<f64>,
     /// Gain of every taxel in this session.
     gains: Vec<f64>,
-    /// 1 + place in `loaded` of every taxel that has been loaded in this session; 0 for the others, which have no state.
+    /// 1 + place in `loaded` of every taxel that has been loaded in this session; 0 of the others, without a state.
     places: Vec<u32>,
     loaded: Vec<Loaded>,
     /// State of the play operators of the loaded taxels, in their order.
