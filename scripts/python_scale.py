@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import multiprocessing
 import os
 import time
 
@@ -167,6 +168,24 @@ def timed(side, touched, kinds, steps):
     return {kind: [1e-3 * float(np.percentile(t, p)) for p in (50, 99)] for kind, t in times.items()}, points
 
 
+def resident():
+    """Memory of the process, bytes."""
+    with open("/proc/self/statm") as file:
+        return int(file.read().split()[1]) * os.sysconf("SC_PAGESIZE")
+
+
+def set_up(side):
+    """Time, s, and memory a taxel, bytes, of the skins of all plates, and of their wires."""
+    marks = [(time.perf_counter(), resident())]
+    skins = [plate_skin(side) for _ in range(PLATES)]
+    marks.append((time.perf_counter(), resident()))
+    wires = [spts.Wire(skin, seed=k) for k, skin in enumerate(skins)]
+    marks.append((time.perf_counter(), resident()))
+    del wires
+    taxels = PLATES * side * side
+    return [[end[0] - begin[0], (end[1] - begin[1]) / taxels] for begin, end in zip(marks, marks[1:])]
+
+
 def main():
     options = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     options.add_argument("--taxels", type=int, nargs="+", default=[10_000, 100_000, 1_000_000])
@@ -179,10 +198,18 @@ def main():
     found = []
     for taxels in chosen.taxels:
         side = round((taxels / PLATES) ** 0.5)
+        # in a process of its own, whose memory nothing else has used before
+        with multiprocessing.get_context("spawn").Pool(1) as pool:
+            made = pool.apply(set_up, (side,))
+        if not chosen.json:
+            text = ", ".join(f"{what} {s:.1f} s, {n:.0f} B a taxel" for what, (s, n) in zip(("skins", "wires"), made))
+            print(f"{PLATES * side * side:8} taxels set up: {text}", flush=True)
         for touched in chosen.touched:
             begin = time.perf_counter()
             times, points = timed(side, touched, chosen.kinds, chosen.steps)
-            found.append({"taxels": PLATES * side * side, "touched": touched, "points": points, "us": times})
+            found.append(
+                {"taxels": PLATES * side**2, "set_up": made, "touched": touched, "points": points, "us": times}
+            )
             if not chosen.json:
                 text = "  ".join(f"{kind} {a:.0f} / {b:.0f}" for kind, (a, b) in times.items())
                 print(

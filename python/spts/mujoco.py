@@ -1002,6 +1002,10 @@ class Dress:
         begin = time.perf_counter()
         if len(measured) != len(self.wires):
             raise ValueError(f"`measured` has {len(measured)} entries; {len(self.wires)} are needed, one a wire")
+        if deadline is not None and not deadline >= 0.0:
+            raise ValueError(f"`deadline` = {deadline} is outside [0, inf) s")
+        if any(phi is None for _, phi in measured):
+            raise ValueError("`measured` has no rows of Φ: `record(...)` gives them, unless `weights=False`")
         images = [(np.maximum(y @ phi / len(y), 0.0), False) for y, phi in measured]
         order = sorted(range(len(measured)), key=lambda k: -float(measured[k][0] @ measured[k][0]))
         for k in order:

@@ -1,5 +1,6 @@
 """Skins on MuJoCo models: balance, energy, and that everything else stays as it was."""
 
+import concurrent.futures
 import copy
 
 import mujoco
@@ -783,10 +784,32 @@ def test_wires_are_decoded_in_time(dog):
     assert np.array_equal(some[touched[-1]][0], whole[touched[-1]][0])
     with pytest.raises(ValueError, match="6 are needed"):
         robot.decode(measured[:2])
+    with pytest.raises(ValueError, match="deadline"):
+        robot.decode(measured, deadline=float("nan"))
+    with pytest.raises(ValueError, match="rows"):
+        robot.decode(robot.record(5, weights=False))
     many = spts.mujoco.dress(model, data, pitch=0.006, wires=1)
     with pytest.raises(ValueError, match="2048 at most"):
         many.decode(many.record(2))
     robot.detach()
+
+
+@pytest.mark.parametrize("mode", ["sense", "foam"])
+def test_threads_do_not_change_what_is_felt(dog, mode):
+    model, *_ = dog
+
+    def felt(seed):
+        data = mujoco.MjData(model)
+        robot = spts.mujoco.dress(model, data, pitch=0.02, wires="limb", mode=mode, seed=seed)
+        data.qvel[0] = 0.1 * seed
+        robot.step(150)
+        found = [t.pressure for t in robot.touches] + [y for y, _ in robot.record(30, weights=False)]
+        robot.detach()
+        return b"".join(part.tobytes() for part in found)
+
+    alone = [felt(seed) for seed in (1, 2, 3)]
+    with concurrent.futures.ThreadPoolExecutor(3) as pool:
+        assert list(pool.map(felt, (1, 2, 3))) == alone
 
 
 def test_a_deep_contact_is_felt():
