@@ -176,7 +176,6 @@ impl Batch<'_> {
     pub(crate) fn add_errors(&mut self, means: &[f64], halves: &[f64], scratch: &mut Scratch) {
         let skin = self.skin;
         let times = |values: &[f64], out: &mut Vec<f64>| {
-            // outside the fours nobody looks
             out.resize(values.len(), 0.0);
             skin.places().for_each(|k| out[k] = values[k] * halves[k]);
         };
@@ -192,6 +191,10 @@ impl Batch<'_> {
         for (i, output_v) in self.output_v.iter_mut().enumerate() {
             let error = lines.between(i, from, || to) + self.rows.weighted(&lines, &scratch.sums, i);
             *output_v += error * self.volts_per_siemens;
+        }
+        // other taxels may conduct in the next batch
+        for values in [&mut scratch.from, &mut scratch.to] {
+            skin.places().for_each(|k| values.get_mut(k).into_iter().for_each(|value| *value = 0.0));
         }
     }
 

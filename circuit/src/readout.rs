@@ -424,13 +424,15 @@ mod tests {
     fn taxels_that_conduct_nothing_add_nothing() {
         for profile in &with_everything() {
             for mode in [Mode::Raster, Mode::Compressive] {
-                let conducting = [3_u32, 4, 5, 41, 97];
                 let mut readouts =
                     [0; 2].map(|_| Readout::new(profile, mode, &SkinLayout::default(), Streams::new(8), 0).unwrap());
                 let mut some = crate::Constant::new(ConductanceMap::zeros(10, 10)).unwrap();
                 for k in 0..3_u32 {
-                    let values = conducting.map(|taxel| (taxel as usize, 1e-5 * f64::from(k * (taxel % 7))));
-                    some.change(values, conducting).unwrap();
+                    // some that conducted before do no more
+                    let conducting = [[3_u32, 4, 5], [41, 97, 4], [5, 98, 0]][k as usize];
+                    let before = (0..100).map(|taxel| (taxel, 0.0));
+                    let now = conducting.map(|taxel| (taxel as usize, 1e-5 * f64::from((k + 1) * (taxel % 7 + 1))));
+                    some.change(before.chain(now), conducting).unwrap();
                     let mut all = crate::Constant::new(some.map().clone()).unwrap();
                     let sources: [&mut dyn ConductanceSource; 2] = [&mut some, &mut all];
                     let mut found = readouts.iter_mut().zip(sources).map(|(readout, source)| {

@@ -29,7 +29,9 @@ impl Segment<'_> {
             None => true,
             Some(values) => len(values) && self.start_s <= time_s && self.end_s.is_finite(),
         };
-        let there = self.fours.and_then(|fours| fours.last()).is_none_or(|last| 4 * (*last as usize) < taxels);
+        let there = self.fours.is_none_or(|fours| {
+            fours.is_sorted_by(|a, b| a < b) && fours.last().is_none_or(|last| 4 * (*last as usize) < taxels)
+        });
         if len(self.conductance_s) && held && there && time_s < self.end_s {
             return Ok(());
         }
@@ -116,8 +118,8 @@ impl Constant {
         Ok(Self { map, fours: None })
     }
 
-    /// Changes the conductance of some taxels, S, and takes those for `conducting`, in order, that are not zero then:
-    /// what is summed is a matter of these alone.
+    /// Changes the conductance of some taxels, S, and takes those for `conducting` that are not zero then: what is summed
+    /// is a matter of these alone.
     ///
     /// ```
     /// use spts_circuit::Constant;
@@ -136,20 +138,19 @@ impl Constant {
     /// If there is no such taxel.
     pub fn change(
         &mut self,
-        values: impl IntoIterator<Item = (usize, f64)>,
+        values: impl IntoIterator<Item = (usize, f64), IntoIter: Clone>,
         conducting: impl IntoIterator<Item = u32>,
     ) -> Result<(), Refusal> {
+        let values = values.into_iter();
+        values.clone().try_for_each(|(taxel, value_s)| check_value(0, taxel, value_s))?;
         for (taxel, value_s) in values {
-            check_value(0, taxel, value_s)?;
             self.map.values_mut()[taxel] = value_s;
         }
         let fours = self.fours.get_or_insert_default();
         fours.clear();
-        for four in conducting.into_iter().map(|taxel| taxel / 4) {
-            if fours.last() != Some(&four) {
-                fours.push(four);
-            }
-        }
+        fours.extend(conducting.into_iter().map(|taxel| taxel / 4));
+        fours.sort_unstable();
+        fours.dedup();
         Ok(())
     }
 

@@ -784,20 +784,20 @@ def _frame(model, field, kind, name):
         return _number(model, mujoco.mjtObj.mjOBJ_BODY, "taxels", name), np.zeros(3), np.eye(3)
     obj = mujoco.mjtObj
     known = {"body": obj.mjOBJ_BODY, "site": obj.mjOBJ_SITE, "geom": obj.mjOBJ_GEOM}
-    kinds, names = list(known) if kind == "link" else [kind], []
-    for kind in kinds:
-        number = mujoco.mj_name2id(model, known[kind], name)
-        if number >= 0:
-            break
-        names += filter(None, (mujoco.mj_id2name(model, known[kind], k) for k in range(_count(model, known[kind]))))
-    else:
+    kinds = list(known) if kind == "link" else [kind]
+    numbers = {kind: mujoco.mj_name2id(model, known[kind], name) for kind in kinds}
+    found = next((kind for kind in kinds if numbers[kind] >= 0), None)
+    if found is None:
+        names = (mujoco.mj_id2name(model, known[k], n) for k in kinds for n in range(_count(model, known[k])))
+        names = list(filter(None, names))
         close = difflib.get_close_matches(name, names, 5, 0.5) or sorted(set(names))[:20]
         raise ValueError(f'{field}: the model has none called "{name}"; it has, among others: {", ".join(close)}')
-    if kind == "body":
+    number = numbers[found]
+    if found == "body":
         return number, np.zeros(3), np.eye(3)
-    body = int(getattr(model, f"{kind}_bodyid")[number])
-    pos, turn = getattr(model, f"{kind}_pos")[number].copy(), _rotation(getattr(model, f"{kind}_quat")[number])
-    if kind == "geom" and model.geom_type[number] == mujoco.mjtGeom.mjGEOM_MESH:
+    body = int(getattr(model, f"{found}_bodyid")[number])
+    pos, turn = getattr(model, f"{found}_pos")[number].copy(), _rotation(getattr(model, f"{found}_quat")[number])
+    if found == "geom" and model.geom_type[number] == mujoco.mjtGeom.mjGEOM_MESH:
         # MuJoCo moves a mesh to its middle and turns it to its axes
         mesh = model.geom_dataid[number]
         turn = turn @ _rotation(model.mesh_quat[mesh]).T
@@ -814,7 +814,7 @@ def _rotation(quat):
 def _sites(model, pattern):
     """The sites whose names a pattern has, as a table."""
     names = [model.site(k).name for k in range(model.nsite)]
-    found = np.array([k for k, name in enumerate(names) if fnmatch.fnmatchcase(name, pattern)], int)
+    found = np.array([k for k, name in enumerate(names) if name and fnmatch.fnmatchcase(name, pattern)], int)
     if len(found) == 0:
         close = ", ".join(sorted(filter(None, names))[:20]) or "none with a name"
         raise ValueError(f'`sites` = "{pattern}": no site of the model has such a name; it has: {close}')
@@ -1011,6 +1011,9 @@ class Dress:
         for k in order:
             left = math.inf if deadline is None else deadline - (time.perf_counter() - begin)
             if self._spent.get((k, decoder), 0.0) > left or left <= 0.0:
+                if (k, decoder) in self._spent and left > 0.0:
+                    # it may have been an exception
+                    self._spent[k, decoder] *= 0.9
                 continue
             learned, now = self._decoder(k, decoder), time.perf_counter()
             y, phi = measured[k]

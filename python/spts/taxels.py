@@ -53,7 +53,8 @@ class Table:
                 except (TypeError, ValueError):
                     raise ValueError(f"{source}: `{name}` has entries that are no numbers") from None
         known = [k for k, name in enumerate(_NUMBERS) if name in columns]
-        taken = (values[:, :6] != 0.0).any(axis=1)
+        # without normals those are NaN
+        taken = (values[:, :3] != 0.0).any(axis=1) | (np.nan_to_num(values[:, 3:6]) != 0.0).any(axis=1)
         self.rows = np.flatnonzero(taken)
         if len(self.rows) == 0:
             raise ValueError(f"{source}: no taxel in it" + (f", {count} rows of zeros" if count else ""))

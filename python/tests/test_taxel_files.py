@@ -313,3 +313,10 @@ def test_many_taxels_load_in_seconds(model, tmp_path):
     robot = dressed(model, taxels={"palm": path})
     assert time.process_time() - began < 10.0
     assert robot.taxels == 100_000 and robot.skins[0].areas.sum() == pytest.approx(4 * np.pi * RADIUS**2, rel=0.02)
+
+
+def test_rows_of_zeros_have_no_taxel():
+    columns = dict(zip("xyz", ([0.0, 1.0, 0.0], [0.0, 0.5, 0.0], [0.0, 0.2, 0.1])))
+    assert list(spts.taxels.Table("a", columns).rows) == [1, 2]
+    normals = {"nx": [0.0, 0.0, 0.0], "ny": [0.0, 0.0, 0.0], "nz": [0.0, 1.0, 1.0]}
+    assert list(spts.taxels.Table("a", columns | normals).rows) == [1, 2]

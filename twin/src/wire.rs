@@ -133,7 +133,6 @@ impl Wire {
             self.skins.iter().flat_map(|worn| worn.conductance_s.iter().map(|(k, g)| (worn.places[*k as usize], *g)));
         self.conducting.clear();
         self.conducting.extend(placed.clone().filter(|(_, g)| *g > 0.0).map(|(place, _)| place));
-        self.conducting.sort_unstable();
         let values = placed.map(|(place, g)| (place as usize, g));
         self.felt.change(values, self.conducting.iter().copied()).map_err(of_conductance)
     }
@@ -152,6 +151,8 @@ impl Wire {
             worn.conductance_s =
                 taxels.into_iter().zip(values).filter(|(k, _)| (*k as usize) < worn.places.len()).collect();
         }
+        let [rows, cols] = [self.felt.map().rows(), self.felt.map().cols()];
+        self.felt = Constant::new(ConductanceMap::zeros(rows, cols)).map_err(of_conductance)?;
         self.conduct()?;
         for line in &mut self.lines {
             line.readout.exchange(state);
@@ -266,9 +267,12 @@ mod tests {
         wire.measure(Mode::Compressive, &mut [0.0; 333]).unwrap();
         let (mut copy, mut saving) = (make(), Snapshot::saving());
         wire.exchange(&mut saving).unwrap();
+        // what a wire has felt before it loads a state is gone
+        copy.feel_touched(&[Some((&[(1, 3e4)], 0.1)), Some((&[(5, 1e4)], 0.1))]).unwrap();
         let mut loading = Snapshot::loading(saving.finish().unwrap());
         copy.exchange(&mut loading).unwrap();
         loading.finish().unwrap();
+        assert_eq!(copy.conductance_s(), wire.conductance_s());
         for wire in [&mut wire, &mut copy] {
             wire.feel_touched(&[Some((&pressed, 0.7)), None]).unwrap();
         }

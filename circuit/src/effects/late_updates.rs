@@ -328,7 +328,6 @@ mod tests {
         assert!(whole == run(&weights, Box::new(any_weights()), 100));
     }
 
-    /// A raster scan has the same late rows whether all collisions are gone through, or the cells that change alone.
     /// Cells that are drawn apart are as late as those that are drawn together; with certain ones, at the same rows.
     #[test]
     fn cells_apart_are_late_alike() {
@@ -345,7 +344,7 @@ mod tests {
             let [apart, together] = [true, false].map(|apart| errors(&run(&weights, late(apart), 10_000)) as f64);
             // Poisson counts
             assert!((apart - together).abs() < 4.0 * (apart + together).sqrt(), "{mode:?}: {apart}, {together}");
-            assert!(run(&weights, late(true), 10_000).len() == 10_000 && apart > 10.0, "{mode:?}: {apart}");
+            assert!(apart > 10.0, "{mode:?}: {apart}");
             let certain = || {
                 let session = EffectSession::of(5, weights.clone());
                 let config = toml::from_str(parameters).unwrap();
@@ -358,6 +357,7 @@ mod tests {
         }
     }
 
+    /// A raster scan has the same late rows whether all collisions are gone through, or the cells that change alone.
     #[test]
     fn a_raster_scan_needs_the_cells_that_change() {
         let weights = Weights::new(WeightMode::Raster, Seeding::Mixed, 4);

@@ -267,8 +267,8 @@ impl Beams {
 pub(super) struct Group {
     /// At most [`LANES`].
     lanes: Range<usize>,
-    /// Its triangles, if they are few enough to be tried one by one.
-    triangles: Option<Vec<Triangle>>,
+    /// Numbers of its triangles, if they are few enough to be tried one by one.
+    triangles: Option<Vec<u32>>,
     /// Whether all bases are outside the mesh, which is closed.
     outside: bool,
 }
@@ -281,7 +281,13 @@ const MANY: usize = 48;
 /// Distance, m, at which each of the beams from `first` on first meets one of `triangles`, which are in the axes of a
 /// body, and whether it enters there (1) or leaves (-1). Infinity where there is none, and past the last beam.
 #[multiversion(targets("x86_64+avx512f", "x86_64+avx2", "aarch64+neon"))]
-fn hits(triangles: &[Triangle], beams: &Beams, first: usize, [axes, origin_m]: [&[Vector; 3]; 2]) -> [[f64; LANES]; 2] {
+fn hits(
+    all: &[Triangle],
+    triangles: &[u32],
+    beams: &Beams,
+    first: usize,
+    [axes, origin_m]: [&[Vector; 3]; 2],
+) -> [[f64; LANES]; 2] {
     let lanes = |values: &[f64]| -> [f64; LANES] {
         std::array::from_fn(|l| values.get(first + l).copied().unwrap_or(f64::NAN))
     };
@@ -295,7 +301,7 @@ fn hits(triangles: &[Triangle], beams: &Beams, first: usize, [axes, origin_m]: [
         (ways[0][l], ways[1][l], ways[2][l]) = (way.x, way.y, way.z);
     }
     let (mut nearest_m, mut enters) = ([f64::INFINITY; LANES], [0.0; LANES]);
-    for triangle in triangles {
+    for triangle in triangles.iter().map(|k| &all[*k as usize]) {
         for l in 0..LANES {
             let start_m = Vector::new(starts[0][l], starts[1][l], starts[2][l]);
             let (distance_m, determinant) = triangle.meets(start_m, Vector::new(ways[0][l], ways[1][l], ways[2][l]));
@@ -459,7 +465,8 @@ impl Standing<'_> {
                         lanes.for_each(|k| out[k] = ray(k));
                         continue;
                     };
-                    let [hits_m, enters] = hits(triangles, beams, lanes.start, [&self.axes, &[self.origin_m; 3]]);
+                    let standing = [&self.axes, &[self.origin_m; 3]];
+                    let [hits_m, enters] = hits(&mesh.triangles, triangles, beams, lanes.start, standing);
                     for (l, k) in lanes.enumerate() {
                         if hits_m[l] < reach_m && (enters[l] > 0.0 || !mesh.closed) {
                             out[k] = thickness_m - hits_m[l];
@@ -486,8 +493,8 @@ impl Standing<'_> {
             let [centre_m, base_m] = [centre_m, base_m].map(|at| into(&self.axes, at - self.origin_m));
             let around = |at: Vector, reach_m: f64| Aabb::new(at - reach_m, at + reach_m);
             let found = around(centre_m, radius_m + reach_m);
-            let found = mesh.boxes.intersect_aabb(&found).take(MANY + 1).map(|k| mesh.triangles[k as usize]);
-            group.triangles = Some(found.collect()).filter(|found: &Vec<Triangle>| found.len() <= MANY);
+            let found: Vec<u32> = mesh.boxes.intersect_aabb(&found).take(MANY + 1).collect();
+            group.triangles = Some(found).filter(|found| found.len() <= MANY);
             let clear = mesh.boxes.intersect_aabb(&around(base_m, radius_m + margin_m)).next().is_none();
             group.outside = mesh.closed && clear && !mesh.holds(base_m);
         }
