@@ -118,8 +118,8 @@ impl Constant {
         Ok(Self { map, fours: None })
     }
 
-    /// Changes the conductance of some taxels, S, and takes those for `conducting` that are not zero then: what is summed
-    /// is a matter of these alone.
+    /// Changes the conductance of some taxels, S, and takes those for `conducting` that are not zero then: what is
+    /// summed is a matter of these alone.
     ///
     /// ```
     /// use spts_circuit::Constant;
