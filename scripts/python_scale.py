@@ -2,9 +2,9 @@
 
 python scripts/python_scale.py [--taxels 10000 100000] [--touched 1 5 20] [--steps 500] [--json]
 
-Twenty plates wear taxels 5 mm apart; a ball of 50 mm radius and 1 kg slides to and fro on each of the touched ones. What
-is touched is the same for any number of taxels. All that is compared is stepped by turns, fifty steps at a time, in one
-process, on one core. "sense+wires" also takes 20 sums of each plate's wire at every step.
+Twenty plates wear taxels 5 mm apart; a ball of 50 mm radius and 1 kg slides to and fro on each of the touched ones.
+What is touched is the same for any number of taxels. All that is compared is stepped by turns, fifty steps at a time,
+in one process, on one core. "sense+wires" also takes 20 sums of each plate's wire at every step.
 
 Peers: `mj_step`; the same with `<tactile>` sensors of as many taxels (depth of a point in the other geom, no force), for
 the touched plates and the others alike; and in the style of MIMo (its touch.py): the force of every contact, shared among the

@@ -59,26 +59,15 @@ impl Readout {
         device: Streams,
         session: u64,
     ) -> Result<Self, Refusal> {
-        Self::of_cells(profile, mode, layout, device, session, false)
+        Self::with_cells(profile, mode, layout, device, session, false)
     }
 
-    /// [`Readout::new`] for sources in which few taxels conduct at a time ([`Segment::fours`](crate::Segment::fours)).
-    /// With more than 1,024 taxels, what a cell does is drawn from streams of its own, so that its noise is another
-    /// than that of [`Readout::new`].
+    /// [`Readout::new`]; with `apart`, what a cell does is drawn from streams of its own. Its noise is another one
+    /// then, and cells whose taxels do not conduct ([`Segment::fours`](crate::Segment::fours)) cost nothing.
     ///
     /// # Errors
     /// As [`Readout::new`].
-    pub fn of_touches(
-        profile: &Profile,
-        mode: Mode,
-        layout: &SkinLayout,
-        device: Streams,
-        session: u64,
-    ) -> Result<Self, Refusal> {
-        Self::of_cells(profile, mode, layout, device, session, layout.taxels() > 1024)
-    }
-
-    fn of_cells(
+    pub fn with_cells(
         profile: &Profile,
         mode: Mode,
         layout: &SkinLayout,

@@ -536,8 +536,10 @@ def dress(
     seed=0,
     **foam,
 ):
-    """Puts skins on links of a robot: on their whole surface, from their geoms, with a taxel about every `pitch`; or with
-    taxels where a file or the model's sites say.
+    """Puts skins on links of a robot.
+
+    They cover the surface of the links' geoms with a taxel about every `pitch`, or have their taxels where a file or
+    the model's sites say.
 
     Parameters
     ----------
@@ -831,8 +833,8 @@ def _sites(model, pattern):
 
 
 def _wires(model, links, skins, wires, readout, seed, labels=()):
-    """Wires over the skins of links, and of each the numbers of its links, or the only one's, and its taxels among theirs,
-    None for all. `labels` are the wires of all taxels, an array a link, where a file says them.
+    """Wires over the skins of links. Of each also the numbers of its links (one number: a touch is no sequence), and
+    its taxels among theirs, None for all. `labels` are the wires of all taxels, an array a link, where a file says them.
     """
     if wires is None:
         return [], []
@@ -1113,8 +1115,8 @@ def _gathered(cell, place, normal, area):
 
 
 def _shell(model, data, link, spacing, meshes, least=12, alone=False):
-    """Places, normals and areas of samples on the geoms of a link, in its axes, that lie in no other geom; with `alone`,
-    in none of the link. At least `least` a geom."""
+    """Places, normals and areas of samples on the geoms of a link, in its axes, at least `least` a geom. They lie in no
+    other geom; with `alone`, in none of the link."""
     geoms = _colliding(model, np.flatnonzero(model.geom_bodyid == link))
     no_surface = (int(mujoco.mjtGeom.mjGEOM_PLANE), int(mujoco.mjtGeom.mjGEOM_HFIELD))
     geoms = [g for g in geoms if model.geom_type[g] not in no_surface]
@@ -1261,8 +1263,8 @@ def body_of(model, body, tolerance=None):
     model : mujoco.MjModel
     body : str or int
     tolerance : float, optional
-        By how much the surface of meshes may err, m, for a faster touch; default 0. What all is planes, spheres, capsules,
-        cylinders, boxes and ellipsoids does not err.
+        By how much the surface of meshes may err, m, for a faster touch; default 0. A body of planes, spheres,
+        capsules, cylinders, boxes and ellipsoids alone does not err.
 
     Raises
     ------

@@ -91,8 +91,8 @@ class Table:
 
 
 def tables(taxels, unit):
-    """Pairs of the link that the caller has named, or None, and a `Table`: of a path, several, arrays, or a dict of those
-    by links."""
+    """The `Table` of every source, with the link that the caller has named for it, or None. `taxels` is a path, several,
+    an array, or a dict of those by links."""
     if unit not in UNITS:
         raise ValueError(f"`unit` = {unit!r}; valid: {', '.join(UNITS)}")
     given = taxels.items() if isinstance(taxels, dict) else [(None, taxels)]

@@ -286,7 +286,7 @@ fn hits(
     triangles: &[u32],
     beams: &Beams,
     first: usize,
-    [axes, origin_m]: [&[Vector; 3]; 2],
+    (axes, origin_m): (&[Vector; 3], Vector),
 ) -> [[f64; LANES]; 2] {
     let lanes = |values: &[f64]| -> [f64; LANES] {
         std::array::from_fn(|l| values.get(first + l).copied().unwrap_or(f64::NAN))
@@ -295,7 +295,7 @@ fn hits(
     let [ax, ay, az] = [0, 1, 2].map(|k| lanes(&beams.outward[k]));
     let (mut starts, mut ways) = ([[0.0; LANES]; 3], [[0.0; LANES]; 3]);
     for l in 0..LANES {
-        let start = into(axes, Vector::new(bx[l], by[l], bz[l]) - origin_m[0]);
+        let start = into(axes, Vector::new(bx[l], by[l], bz[l]) - origin_m);
         let way = into(axes, Vector::new(ax[l], ay[l], az[l]));
         (starts[0][l], starts[1][l], starts[2][l]) = (start.x, start.y, start.z);
         (ways[0][l], ways[1][l], ways[2][l]) = (way.x, way.y, way.z);
@@ -465,8 +465,8 @@ impl Standing<'_> {
                         lanes.for_each(|k| out[k] = ray(k));
                         continue;
                     };
-                    let standing = [&self.axes, &[self.origin_m; 3]];
-                    let [hits_m, enters] = hits(&mesh.triangles, triangles, beams, lanes.start, standing);
+                    let own = (&self.axes, self.origin_m);
+                    let [hits_m, enters] = hits(&mesh.triangles, triangles, beams, lanes.start, own);
                     for (l, k) in lanes.enumerate() {
                         if hits_m[l] < reach_m && (enters[l] > 0.0 || !mesh.closed) {
                             out[k] = thickness_m - hits_m[l];

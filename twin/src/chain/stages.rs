@@ -161,9 +161,11 @@ impl Chain {
         self.driven(Readout::new(&self.profile, mode, &self.skin, self.streams, session))
     }
 
-    /// As [`Chain::readout`], by [`Readout::of_touches`].
+    /// [`Chain::readout`] of touches by hand and robot: few of many taxels conduct. On more than 1,024 the cells are
+    /// drawn apart.
     pub(crate) fn readout_of_touches(&self, mode: Mode, session: u64) -> Result<Readout, Refusal> {
-        self.driven(Readout::of_touches(&self.profile, mode, &self.skin, self.streams, session))
+        let apart = self.skin.taxels() > 1024;
+        self.driven(Readout::with_cells(&self.profile, mode, &self.skin, self.streams, session, apart))
     }
 
     fn driven(&self, readout: Result<Readout, Refusal>) -> Result<Readout, Refusal> {
