@@ -8,7 +8,7 @@ ifneq ($(RECORDINGS),)
 export SPTS_RECORDINGS ?= $(abspath $(RECORDINGS))
 endif
 
-.PHONY: demo install test validate readers wheel python book browser bench firmware setup clean
+.PHONY: demo install test validate readers wheel wheels release smoke python book browser bench firmware setup clean
 
 demo: setup
 	./scripts/demo.sh "$(OUT)" $(if $(RECORDINGS),"$(RECORDINGS)")
@@ -39,26 +39,37 @@ readers: setup
 	cargo build --release --locked --quiet --workspace
 	"$(READERS)/bin/python" -m pytest $(PARALLEL) --quiet --tb=short -rs --disable-warnings -p no:cacheprovider scripts/dataset
 
-# The wheel of the Python package `spts`, in out/wheels: two minutes after `make demo`.
-MATURIN ?= out/maturin
+# The wheel of the Python package `spts` for this machine, in out/wheels: two minutes after `make demo`.
+TOOLS ?= out/tools
 WHEELS ?= out/wheels
 wheel: setup
-	./scripts/environment.sh "$(MATURIN)" python/build-requirements.txt
-	./scripts/wheel.sh "$(MATURIN)/bin/maturin" "$(WHEELS)"
+	./scripts/environment.sh "$(TOOLS)" python/build-requirements.txt
+	./scripts/wheel.sh "$(TOOLS)" "$(WHEELS)"
 
-# The Python package installed into two virtual environments and tested there: out/python has everything that it can
-# work with, out/python-scenes the MuJoCo that its scenes need. It fetches Python packages of about 500 MB once.
+# What a release gives away, in out/release: wheels and programs for Linux from glibc 2.17 on, the licences of what is
+# in them, and SHA-256. `make wheels` builds the wheels alone. A quarter of an hour a target on two cores. `make smoke`
+# tries them in an empty Debian, as root.
+RELEASE ?= out/release
+TARGETS ?= x86_64-unknown-linux-gnu aarch64-unknown-linux-gnu
+wheels:
+	./scripts/environment.sh "$(TOOLS)" python/build-requirements.txt
+	./scripts/wheel.sh "$(TOOLS)" "$(RELEASE)" $(TARGETS)
+
+release: wheels
+	./scripts/release.sh "$(TOOLS)" "$(RELEASE)" $(TARGETS)
+
+smoke:
+	./scripts/smoke.sh "$(RELEASE)"
+
+# The Python package installed into a virtual environment, out/python, with everything that it can work with, and tested
+# there. It fetches Python packages of about 500 MB once.
 PYTHON ?= out/python
-PYTHON_SCENES ?= out/python-scenes
 python: wheel
 	./scripts/environment.sh "$(PYTHON)" python/requirements.txt
-	./scripts/environment.sh "$(PYTHON_SCENES)" python/scenes/requirements.txt
 	"$(PYTHON)/bin/ruff" check --quiet --config python/pyproject.toml python scripts/python_*.py
 	"$(PYTHON)/bin/ruff" format --quiet --check --config python/pyproject.toml python/spts python/tests scripts/python_*.py
 	"$(PYTHON)/bin/python" -m pip install --quiet --disable-pip-version-check --force-reinstall --no-deps "$(WHEELS)"/spts_twin-*.whl
-	"$(PYTHON_SCENES)/bin/python" -m pip install --quiet --disable-pip-version-check --force-reinstall --no-deps "$(WHEELS)"/spts_twin-*.whl
 	"$(PYTHON)/bin/python" -m pytest $(PARALLEL) --quiet --tb=short -rs --disable-warnings -p no:cacheprovider python/tests
-	"$(PYTHON_SCENES)/bin/python" -m pytest --quiet --tb=short -p no:cacheprovider python/tests/test_scenes.py
 
 # The book, out/book/index.html: its links are checked, its commands and its Python are run. BLOCKS="--with slow" runs
 # what takes minutes, too. MkDocs is not told to be quiet: it would then count no warning. Where the Python package is

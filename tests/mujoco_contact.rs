@@ -179,6 +179,7 @@ impl Skin {
         let lowest_m = body.heights_m()[0] + body.position_m[2];
         let depth = -lowest_m / self.cell_m;
         assert!(depth > 0.0, "the body is above the skin");
+        spts_sim::engine::open().expect("MuJoCo is there");
         let model = MjModel::from_xml_string(&self.mjcf(body.mesh)).expect("MuJoCo takes the skin");
         let mut data = MjData::new(Box::new(model));
         assert_eq!(data.qpos().len(), self.coordinates);

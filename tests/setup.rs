@@ -1,7 +1,8 @@
 //! `scripts/setup.sh` on libraries that are as they should be and that are not.
 
+use crate::command::SPTS;
 use std::fs;
-use std::os::unix::fs::{PermissionsExt, symlink};
+use std::os::unix::fs::PermissionsExt as _;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
@@ -20,7 +21,6 @@ impl Project {
         }
         fs::copy(root.join("scripts/setup.sh"), project.0.path().join("scripts/setup.sh")).unwrap();
         fs::copy(root.join("third_party/mujoco/lib").join(LIBRARY), project.library()).unwrap();
-        symlink(LIBRARY, project.library().with_file_name("libmujoco.so")).unwrap();
         for (name, text) in [
             ("dpkg-query", "echo installed"),
             ("cargo", "exit 0"),
@@ -72,19 +72,55 @@ fn one_flipped_bit_is_found() {
     project.is_refused(&[LIBRARY, "is not MuJoCo 3.17.0", "SHA-256"]);
 }
 
-/// The linker takes `libmujoco.so`, the loader the name with the version: both are looked at.
-#[test]
-fn a_replaced_link_is_found() {
-    let project = Project::new();
-    let link = project.library().with_file_name("libmujoco.so");
-    fs::remove_file(&link).unwrap();
-    fs::write(link, "another library").unwrap();
-    project.is_refused(&["lib/libmujoco.so is not MuJoCo"]);
-}
-
 #[test]
 fn a_missing_library_is_fetched() {
     let project = Project::new();
     fs::remove_file(project.library()).unwrap();
     project.is_refused(&["is missing"]);
+}
+
+/// Runs a program that lies alone in a folder, with a MuJoCo that `SPTS_MUJOCO` names, or none.
+fn alone(arguments: &[&str], mujoco: Option<&Path>) -> Output {
+    let folder = tempfile::tempdir().unwrap();
+    let program = folder.path().join("spts");
+    fs::copy(SPTS, &program).unwrap();
+    let mut command = Command::new(program);
+    command.args(arguments).current_dir(folder.path()).env_remove("SPTS_MUJOCO");
+    if let Some(file) = mujoco {
+        command.env("SPTS_MUJOCO", file);
+    }
+    command.output().unwrap()
+}
+
+/// Without MuJoCo a program starts and does all but scenes, of which it says in one line what they need.
+#[test]
+fn scenes_alone_need_mujoco() {
+    let made = alone(&["dataset", "make", "random-shapes", "--rows", "20"], None);
+    assert!(made.status.success(), "{}", String::from_utf8_lossy(&made.stderr));
+    let folder = tempfile::tempdir().unwrap();
+    let [text, missing] = ["text", "missing"].map(|name| folder.path().join(name));
+    fs::write(&text, "no library").unwrap();
+    // of the C library's files, one that is a library and has none of MuJoCo's functions
+    let other = PathBuf::from("/lib/x86_64-linux-gnu/libm.so.6");
+    let cases: [(Option<&Path>, &str); 4] = [
+        (None, "it is not found"),
+        (Some(&text), "cannot be opened"),
+        (Some(&missing), "is no file"),
+        (Some(&other), "is no MuJoCo"),
+    ];
+    let scenes: [&[&str]; 4] = [
+        &["simulate", "press/T"],
+        &["score", "--twin", "press/T", "--quick"],
+        &["dataset", "make", "drops", "--rows", "20"],
+        &["simulate", "press/T", "--tolerance", "0.1"],
+    ];
+    for (library, words) in cases {
+        for arguments in scenes {
+            let output = alone(arguments, library);
+            let said = String::from_utf8_lossy(&output.stderr);
+            assert_eq!(output.status.code(), Some(2), "{arguments:?} {said}");
+            assert_eq!(said.lines().count(), 1, "{arguments:?} {said}");
+            assert!(said.contains(words), "{arguments:?} {said}");
+        }
+    }
 }

@@ -1,12 +1,8 @@
-//! Records the revision of the sources that the program is built from, and where its tests find MuJoCo.
-
-#[path = "../scripts/library_path.rs"]
-mod library_path;
+//! Records the revision of the sources that the program is built from.
 
 use std::process::Command;
 
 fn main() {
-    library_path::main();
     println!("cargo:rerun-if-env-changed=SPTS_GIT_REVISION");
     // a file that is not there would count as changed at every build
     if let Some(folder) = git(&["rev-parse", "--absolute-git-dir"]) {

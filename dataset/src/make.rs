@@ -1,6 +1,5 @@
 //! Makes rows. Each is a function of the specification and its number.
 
-#[cfg(feature = "mujoco")]
 mod engine;
 mod press;
 mod touch;

@@ -21,7 +21,6 @@ import time
 import numpy as np
 
 from ._spts import DataFolder, shipped_specs
-from .scenes import engine
 
 __all__ = ["Dataset", "make", "specs"]
 
@@ -107,6 +106,9 @@ class Dataset:
 
     def labelled(self, split="train", rows=None):
         """What decoders learn from and are scored on.
+
+        All rows of one shape belong to one split, so that a data set of few shapes may have none in another:
+        `spts.dataset.make(…, set={"object.rows_per_shape": 20})` makes more shapes.
 
         Parameters
         ----------
@@ -287,12 +289,8 @@ def _on_threads(begun, _, shards, workers, bar):
 
 
 def _begin(spec, folder, overrides):
-    """The data set in its folder; with the physics engine when that is there."""
-    try:
-        kind = engine().DataFolder
-    except ImportError:
-        kind = DataFolder
-    return kind.begin(spec, folder, overrides)
+    """The data set in its folder."""
+    return DataFolder.begin(spec, folder, overrides)
 
 
 def _shard(spec, folder, overrides, shard):

@@ -193,11 +193,33 @@ def decode(phi, y, shape, decoder=DEFAULT, prior=None):
     -------
     ndarray (rows, cols)
         Image, one value a taxel, in the unit of y: what the taxel alone would give with the weight 1.
+
+    Raises
+    ------
+    ValueError
+        For arrays of other shapes, and for `phi` and `y` in the other order.
     """
+    phi, y = _real(phi, y)
+    for name, array, needed, ndim in (("phi", phi, "(M, taxels)", 2), ("y", y, "(M,)", 1)):
+        if array.ndim != ndim:
+            one = f": take {name}[0]" if array.ndim == ndim + 1 else ""
+            raise ValueError(f"`{name}` has shape {array.shape}; {needed} is needed{one}")
     if prior is not None:
         prior = as_images(prior, _shape(shape), "prior")
     found = learned(decoder, shape, prior)
-    return found.decode(np.asarray(phi, np.float64), np.asarray(y, np.float64))
+    return found.decode(phi, y)
+
+
+def _real(phi, y):
+    """Both as arrays of real numbers, in this order."""
+    if np.iscomplexobj(phi) or np.iscomplexobj(y):
+        raise ValueError("`phi` and `y` are real; one of them is complex")
+    phi, y = np.asarray(phi, np.float64), np.asarray(y, np.float64)
+    if y.ndim > 1 and y.shape[:-1] == phi.shape:
+        raise ValueError(
+            f"`phi` and `y` are swapped: their shapes are {phi.shape} and {y.shape}. `Wire.record` returns (y, phi)"
+        )
+    return phi, y
 
 
 def windows(phi, y):
@@ -213,9 +235,7 @@ def windows(phi, y):
     ndarray (n, M * (1 + taxels))
         What the estimators of `spts.decoders` take as X.
     """
-    if np.iscomplexobj(phi) or np.iscomplexobj(y):
-        raise ValueError("`phi` and `y` are real; one of them is complex")
-    phi, y = np.asarray(phi, np.float64), np.asarray(y, np.float64)
+    phi, y = _real(phi, y)
     if phi.ndim == 2 and y.ndim == 1:
         phi, y = phi[None], y[None]
     if phi.ndim != 3 or y.ndim != 2 or phi.shape[:2] != y.shape:

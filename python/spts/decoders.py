@@ -72,7 +72,7 @@ class ImageDecoder(BaseEstimator):
 
     def score(self, X, y):
         """Mean intersection over union of the supports with those of the images `y` (n, taxels)."""
-        return float(np.mean(iou(self.predict(X), as_images(y, self._built.shape, "y"))))
+        return float(np.mean(iou(self.predict(X)[:, None], as_images(y, self._built.shape, "y")[:, None])))
 
     def _decode(self, X):
         check_is_fitted(self, "_built")

@@ -5,9 +5,14 @@ The support of an image is its taxels above 0.23 of its own largest value.
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 
 from ._spts import support_scores
+
+# Sides of an array up to which it is taken for what may be one image.
+_SIDE = 64
 
 
 def support_accuracy(images, truths):
@@ -16,11 +21,17 @@ def support_accuracy(images, truths):
     Parameters
     ----------
     images, truths : ndarray (n, taxels), (n, rows, cols) or (taxels,)
-        Of the same shape. One image of rows and columns is `image[None]`.
+        Of the same shape. One image of rows and columns is `image[None]`, as an array with two axes holds one image a row.
 
     Returns
     -------
     ndarray (n,)
+
+    Warns
+    -----
+    UserWarning
+        For an array with two axes that looks like one image: both are of 2 to 64, or equal. `images[:, None]` says that
+        it is n images, without a warning.
     """
     return support_scores(*_pairs(images, truths))[0]
 
@@ -35,4 +46,10 @@ def _pairs(images, truths):
     if images.shape != truths.shape or images.ndim == 0:
         raise ValueError(f"`images` has shape {images.shape} and `truths` {truths.shape}; both have to be the same")
     count = 1 if images.ndim == 1 else len(images)
+    if images.ndim == 2 and min(images.shape) > 1 and (max(images.shape) <= _SIDE or count == images.shape[1]):
+        warnings.warn(
+            f"`images` has shape {images.shape}: it is scored as {count} images of {images.shape[1]} taxels. One image of "
+            f"{count} x {images.shape[1]} taxels is `image[None]`; `images[:, None]` ends this warning",
+            stacklevel=3,
+        )
     return images.reshape(count, -1), truths.reshape(count, -1)

@@ -547,8 +547,8 @@ def dress(
     data : mujoco.MjData
         Taxels inside the geoms of other links, as they stand in this data, are left out.
     links : "all" or sequence of str or int
-        Bodies; "all" are those with a geom that collides, but the world and what is welded to it, or those that
-        `taxels` or `sites` name.
+        Bodies; "all" are those with a geom that collides, but the world, what is welded to it, and loose objects: bodies
+        on a free joint that have no child, such as a ball. With `taxels` or `sites` "all" are those that they name.
     pitch : float, optional
         Distance between taxels, m, [1e-4, 1]; default 0.01. With `taxels` or `sites`, those without an area have the
         square of it; by default, their share of the surface among their neighbours.
@@ -615,7 +615,7 @@ def dress(
     if every:
         if links != "all":
             raise ValueError(f'`links` = "{links}"; valid: "all" or a list of bodies')
-        moving = (b for b in range(1, model.nbody) if model.body_weldid[b] != 0)
+        moving = (b for b in range(1, model.nbody) if model.body_weldid[b] != 0 and not _loose(model, b))
         links = [b for b in moving if _colliding(model, np.flatnonzero(model.geom_bodyid == b))]
     links = [_number(model, mujoco.mjtObj.mjOBJ_BODY, "links", link) for link in links]
     placed = None
@@ -623,7 +623,10 @@ def dress(
         placed = _placed(model, taxels, sites, unit, None if every else links)
         links = list(placed)
     if not links:
-        raise ValueError("`links` is empty: the model has no moving body with a geom that collides")
+        raise ValueError(
+            "`links` is empty: the model has no moving body with a geom that collides, or loose objects alone, which are to "
+            "be named"
+        )
     if data.time == 0.0 and not data.xmat.any():
         mujoco.mj_kinematics(model, data)
     shapes, meshes, bare, dressed = {}, {}, [], []
@@ -1313,6 +1316,13 @@ def _of_geom(model, name):
 
 def _colliding(model, geoms):
     return [int(g) for g in geoms if model.geom_contype[g] or model.geom_conaffinity[g]]
+
+
+def _loose(model, body):
+    """Whether a body is on a free joint and has no child."""
+    joint = model.body_jntadr[body]
+    free = joint >= 0 and model.jnt_type[joint] == mujoco.mjtJoint.mjJNT_FREE
+    return bool(free) and not (model.body_parentid == body).any()
 
 
 def _all(model, link):

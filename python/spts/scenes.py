@@ -7,28 +7,15 @@ import os
 import tempfile
 import warnings
 
+from . import _spts
 from .sessions import load
 
 __all__ = ["simulate"]
 
-
-def engine():
-    """The part of the package that shares MuJoCo's library.
-
-    Raises
-    ------
-    ImportError
-        When MuJoCo's package is missing, or is of another version than this one was built for.
-    """
-    if importlib.util.find_spec("mujoco") is None:
-        raise ImportError("scenes need MuJoCo 3.17.0: pip install 'spts-twin[scenes]'")
-    try:
-        from . import _scenes
-    except ImportError as error:
-        raise ImportError(
-            f"scenes need the MuJoCo that they were built with, 3.17.0: pip install 'spts-twin[scenes]' ({error})"
-        ) from None
-    return _scenes
+# the library of PyPI's mujoco, which need not be imported for it
+_mujoco = importlib.util.find_spec("mujoco")
+for _folder in (_mujoco and _mujoco.submodule_search_locations) or []:
+    _spts.look_in(_folder)
 
 
 def simulate(scene, out=None, set=None):
@@ -53,11 +40,11 @@ def simulate(scene, out=None, set=None):
     ValueError
         For what is no scene, with field, value and what is valid.
     ImportError
-        Without MuJoCo 3.17.0.
+        Without MuJoCo 3.17.0, which may lie beside another version that Python imports: `SPTS_MUJOCO` names its file.
     """
-    run = engine().simulate
+    _spts.open_mujoco()
     with tempfile.TemporaryDirectory() as folder:
         kept = os.path.join(folder, "session") if out is None else os.fspath(out)
-        for note in run(os.fspath(scene), dict(set or {}), kept):
+        for note in _spts.simulate(os.fspath(scene), dict(set or {}), kept):
             warnings.warn(note, stacklevel=2)
         return load(kept)

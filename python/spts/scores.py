@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import copy
+import inspect
 import json
 import os
+import tempfile
 import threading
+from types import SimpleNamespace
 
 import numpy as np
 
-from ._spts import score_sessions, support_scores
+from ._spts import Session, score_sessions, support_scores
 from .dataset import Dataset
 from .decode import windows
 
@@ -66,10 +70,13 @@ def score(
     ----------
     estimator : str, estimator, or a list or dict of them
         A decoder's name, or whatever has `predict(X)` with X as `spts.windows` makes it: images (n, taxels), or classes. An
-        estimator that is fitted already is scored as it is. Another one is cloned and learns, for every M, from windows
-        that are computed of raster images: `fit(X, images)`, or `fit(X, names)` of a classifier.
-    data : str, os.PathLike or Dataset
-        Sessions, as `spts.load_all` takes them, or a data set.
+        estimator that is fitted already is scored as it is. Another one of scikit-learn is cloned and learns, for every
+        M, from windows that are computed of raster images: `fit(X, images)`, or `fit(X, names)` of a classifier.
+        An entrant of `spts bench` will do, too: `predict(phi, y)` with phi (M, taxels) and y (M,), which answers an image
+        or (image, name). It is copied and learns with `fit(train)`, if it has `fit`; its `rows` and `read` are not
+        asked.
+    data : str, os.PathLike, Session, sequence of Session, or Dataset
+        Sessions, or the folder of them as `spts.load_all` takes it, or a data set.
     measurements : sequence of int
         M, [1, 10000].
     objects : sequence of str
@@ -106,11 +113,28 @@ def score(
     decoders = [given for _, given in named if isinstance(given, str)]
     given = [(name, Contender(given)) for name, given in named if not isinstance(given, str)]
     objects = [objects] if isinstance(objects, str) else list(objects)
-    board, text = score_sessions(
-        os.fspath(data), decoders, given, measurements, objects, left_out, learn_from, sensing, times, seed
-    )
+    with tempfile.TemporaryDirectory() as folder:
+        board, text = score_sessions(
+            _folder(data, folder), decoders, given, measurements, objects, left_out, learn_from, sensing, times, seed
+        )
     board = json.loads(board)
     return Scores(board["rows"], board["objects"], text)
+
+
+def _folder(data, folder):
+    """The folder of the sessions `data`, which are written into `folder` unless they are in one."""
+    if isinstance(data, (str, os.PathLike)):
+        return os.fspath(data)
+    sessions = [data] if isinstance(data, Session) else data
+    if not isinstance(sessions, (list, tuple)) or not all(isinstance(one, Session) for one in sessions):
+        raise TypeError(
+            f"`data` is of type {type(data).__name__}; valid: a folder, a Dataset, a Session, a list of Session"
+        )
+    if not sessions:
+        raise ValueError("`data` holds no session")
+    for number, session in enumerate(sessions):
+        session.write(os.path.join(folder, f"{number:04}"))
+    return folder
 
 
 def _named(estimator):
@@ -128,7 +152,9 @@ def _named(estimator):
     for name, one in named:
         if not isinstance(one, str) and not hasattr(one, "predict"):
             raise ValueError(f"`estimator` {name} is a {type(one).__name__}, which has no `predict`")
-    return named
+        if isinstance(one, type):
+            raise ValueError(f"`estimator` is the class {one.__name__}: give an object of it, {one.__name__}()")
+    return [(name, _Entrant(one) if not isinstance(one, str) and _is_entrant(one) else one) for name, one in named]
 
 
 class Contender:
@@ -153,55 +179,100 @@ class Contender:
             return fitted[m]
 
         def answers(phi, y):
-            found = np.asarray(ready(phi).predict(windows(phi, y)))
-            if found.ndim == 1:
-                known = [numbers.get(str(v), -1) if isinstance(v, str) else int(v) for v in found.tolist()]
-                return None, np.asarray(known, np.int64)
-            return np.ascontiguousarray(found.reshape(len(found), -1), np.float64), None
+            images, found = _asked(ready(phi), phi, y)
+            if found is None:
+                return images, None
+            known = [numbers.get(str(v), -1) if isinstance(v, str) else int(v) for v in found.tolist()]
+            return images, np.asarray(known, np.int64)
 
         return answers
 
 
+class _Entrant:
+    """An entrant of `spts bench` (docs/benchmark.md)."""
+
+    def __init__(self, entrant):
+        self.entrant = entrant
+
+    def learned(self, images, names, shape, m):
+        """A copy that has learned from images (n, taxels) with these names."""
+        one, (rows, cols) = copy.deepcopy(self.entrant), shape
+        if hasattr(one, "fit"):
+            one.fit(SimpleNamespace(images=images, labels=list(names), rows=rows, cols=cols, measurements=[m]))
+        return _Entrant(one)
+
+    def answers(self, phi, y):
+        """Images (n, taxels) of windows, and classes (n,) or None."""
+        found = [self.entrant.predict(*window) for window in zip(phi, y)]
+        found = [one if isinstance(one, tuple) else (one, None) for one in found]
+        images = np.stack([np.asarray(image, np.float64).ravel() for image, _ in found])
+        classes = None if all(name is None for _, name in found) else np.asarray([str(name) for _, name in found])
+        return images, classes
+
+
+def _is_entrant(estimator):
+    """Whether its `predict` needs two arguments."""
+    try:
+        arguments = inspect.signature(estimator.predict).parameters.values()
+    except (TypeError, ValueError):
+        # not of Python
+        return False
+    return sum(a.default is a.empty and a.kind <= a.POSITIONAL_OR_KEYWORD for a in arguments) == 2
+
+
+def _asked(estimator, phi, y):
+    """Images (n, taxels) and classes (n,) of windows; None for what the estimator does not answer."""
+    if isinstance(estimator, _Entrant):
+        return estimator.answers(phi, y)
+    found = np.asarray(estimator.predict(windows(phi, y)))
+    if found.ndim == 1:
+        return None, found
+    return np.ascontiguousarray(found.reshape(len(found), -1), np.float64), None
+
+
 def _is_ready(estimator):
     """Whether it has learned, or does not learn at all."""
+    if isinstance(estimator, _Entrant):
+        return not hasattr(estimator.entrant, "fit")
+    if not hasattr(estimator, "fit"):
+        return True
     from sklearn.exceptions import NotFittedError
     from sklearn.utils.validation import check_is_fitted
 
-    if not hasattr(estimator, "fit"):
-        return True
     try:
         check_is_fitted(estimator)
     except NotFittedError:
         return False
-    except TypeError:
+    except (AttributeError, TypeError):
         # not of scikit-learn: nobody knows
         return True
     return True
 
 
 def _fitted(estimator, images, labels, names, shape, phi):
-    """A clone that has learned from windows that are computed of images, with rows of Φ as in `phi` (n, M, taxels)."""
+    """A copy that has learned from windows that are computed of images, with rows of Φ as in `phi` (n, M, taxels)."""
+    if isinstance(estimator, _Entrant):
+        return estimator.learned(images, [names[label] for label in labels], shape, phi.shape[1])
+    again = -(-_LEARNED // len(images))
+    images, labels = np.tile(images, (again, 1)), np.tile(labels, again)
+    rows = phi[np.arange(len(images)) % len(phi)]
+    X = windows(rows, np.einsum("nmk,nk->nm", rows, images))
+    return _fitted_clone(estimator, X, images, labels, np.asarray(names)[labels], shape)
+
+
+def _fitted_clone(estimator, X, images, labels, names, shape):
     from sklearn.base import clone, is_classifier
 
     one = clone(estimator)
     if "shape" in one.get_params():
         one.set_params(shape=tuple(shape))
-    again = -(-_LEARNED // len(images))
-    images, labels = np.tile(images, (again, 1)), np.tile(labels, again)
-    rows = phi[np.arange(len(images)) % len(phi)]
-    X = windows(rows, np.einsum("nmk,nk->nm", rows, images))
-    if not is_classifier(one):
-        if _takes(one, "labels"):
-            return one.fit(X, images, labels=labels)
-        return one.fit(X, images)
-    targets = np.asarray([names[label] for label in labels])
-    return one.fit(X, targets, images=images) if _takes(one, "images") else one.fit(X, targets)
+    if is_classifier(one):
+        return one.fit(X, names, images=images) if _takes(one, "images") else one.fit(X, names)
+    return one.fit(X, images, labels=labels) if _takes(one, "labels") else one.fit(X, images)
 
 
 def _takes(estimator, argument):
     """Whether `fit` has this argument."""
-    import inspect
-
     return argument in inspect.signature(estimator.fit).parameters
 
 
@@ -217,15 +288,14 @@ def _on_rows(named, data, measurements, split, span):
     lines, objects = [], []
     for name, one in named:
         for m in measurements:
-            X = windows(phi[:, :m], y[:, :m])
-            found = np.asarray(_ready_for(one, learn, shape, m).predict(X))
+            images, classes = _asked(_ready_for(one, learn, shape, m), phi[:, :m], y[:, :m])
             line = {"decoder": name, "m": m, "left_out": False}
             line |= {"learned_from": "given" if _learned(one) else "train", "sensing": "random"}
-            if found.ndim == 1:
-                values = {"class_single": (found.astype(str) == names.astype(str)).astype(float)}
-            else:
-                accuracy, iou = support_scores(np.ascontiguousarray(found.reshape(len(found), -1), np.float64), truths)
-                values = {"support": accuracy, "iou": iou}
+            values = {}
+            if images is not None:
+                values["support"], values["iou"] = support_scores(images, truths)
+            if classes is not None:
+                values["class_single"] = (classes.astype(str) == names.astype(str)).astype(float)
             bands = {f"{key}_ci": _band(value, names, presses) for key, value in values.items()}
             lines.append({**line, **{key: float(value.mean()) for key, value in values.items()}, **bands})
             for object in np.unique(names):
@@ -244,21 +314,14 @@ def _ready_for(one, learn, shape, m):
     if _learned(one):
         return one
     phi, y, images, names, _ = learn
+    if isinstance(one, _Entrant):
+        return one.learned(images, names.tolist(), shape, m)
     if isinstance(one, str):
         from .decoders import ImageDecoder
 
         one = ImageDecoder(one)
-    from sklearn.base import clone, is_classifier
-
-    one = clone(one)
-    if "shape" in one.get_params():
-        one.set_params(shape=shape)
-    X = windows(phi[:, :m], y[:, :m])
-    if is_classifier(one):
-        return one.fit(X, names, images=images) if _takes(one, "images") else one.fit(X, names)
-    if _takes(one, "labels"):
-        return one.fit(X, images, labels=np.unique(names, return_inverse=True)[1])
-    return one.fit(X, images)
+    labels = np.unique(names, return_inverse=True)[1]
+    return _fitted_clone(one, windows(phi[:, :m], y[:, :m]), images, labels, names, shape)
 
 
 def _band(values, objects, presses):

@@ -15,7 +15,6 @@ use std::time::Duration;
 use toml::Value;
 
 /// Ends a function with a `ValueError` of this format.
-#[allow(unused_macros, reason = "the part with a physics engine has no use for it")]
 macro_rules! bail {
     ($($format:tt)+) => {
         return Err($crate::common::refuse(format!($($format)+)))
@@ -28,19 +27,16 @@ pub(crate) fn refuse(error: impl std::fmt::Display) -> PyErr {
 }
 
 /// Warns the caller of `note`.
-#[allow(dead_code, reason = "the part with a physics engine has no use for it")]
 pub(crate) fn warn(py: Python<'_>, note: &str) -> PyResult<()> {
     PyErr::warn(py, &py.get_type::<PyUserWarning>(), &CString::new(note)?, 1)
 }
 
 /// `value` as the text that pickles hold.
-#[allow(dead_code, reason = "the part with a physics engine has no use for it")]
 pub(crate) fn to_toml(value: &impl Serialize) -> PyResult<String> {
     toml::to_string(value).map_err(refuse)
 }
 
 /// What such a text was made of.
-#[allow(dead_code, reason = "the part with a physics engine has no use for it")]
 pub(crate) fn of_toml<T: DeserializeOwned>(text: &str) -> PyResult<T> {
     toml::from_str(text).map_err(refuse)
 }

@@ -9,6 +9,7 @@ mod decode;
 mod mount;
 mod recorded;
 mod scorer;
+mod simulate;
 mod skin;
 mod wire;
 
@@ -31,6 +32,8 @@ mod _spts {
     use super::recorded::{Recording, Session, load};
     #[pymodule_export]
     use super::scorer::{score_sessions, support_scores};
+    #[pymodule_export]
+    use super::simulate::{look_in, open_mujoco, simulate};
     #[pymodule_export]
     use super::skin::{Skin, Touch};
     #[pymodule_export]

@@ -836,13 +836,13 @@ def test_wires_keep_links_whole():
     """Four like links on two wires are two and two."""
     links = "".join(f'<body name="{k}" pos="{k} 0 0"><freejoint/><geom size=".1"/></body>' for k in range(4))
     model = mujoco.MjModel.from_xml_string(f"<mujoco><worldbody>{links}</worldbody></mujoco>")
-    robot = spts.mujoco.dress(model, mujoco.MjData(model), pitch=0.03, wires=2)
+    robot = spts.mujoco.dress(model, mujoco.MjData(model), [*"0123"], 0.03, wires=2)
     counts = [len(skin.areas) for skin in robot.skins]
     assert [w.shape[1] for w in robot.wires] == [sum(counts[:2]), sum(counts[2:])]
     # each is a tree of its own, and a limb
-    limbs = spts.mujoco.dress(model, mujoco.MjData(model), pitch=0.03, wires="limb")
+    limbs = spts.mujoco.dress(model, mujoco.MjData(model), [*"0123"], 0.03, wires="limb")
     assert [w.shape[1] for w in limbs.wires] == counts
-    none = spts.mujoco.dress(model, mujoco.MjData(model), pitch=0.03, wires=None)
+    none = spts.mujoco.dress(model, mujoco.MjData(model), [*"0123"], 0.03, wires=None)
     with pytest.raises(ValueError, match="wires"):
         none.record(5)
 
@@ -894,6 +894,18 @@ def test_skins_of_two_links_feel_one_force():
     assert 0.0 < gaps[0] < min(thick, gaps[1]) and gaps[1] < 2 * thick
     # between balls a linear foam of half the stiffness gives way by √2 as much, one that stiffens by more
     assert 2**0.5 < (2 * thick - gaps[1]) / (thick - gaps[0]) < 2.0
+
+
+def test_loose_objects_wear_skin_if_they_are_named(dog):
+    """A ball beside the dog is felt, and has taxels only when it is asked for; a free base is a part of the robot."""
+    ball = '<body name="ball" pos="0 0 1"><freejoint/><geom size=".05" mass=".1"/></body></worldbody>'
+    model = mujoco.MjModel.from_xml_string(DOG.replace("</worldbody>", ball))
+    robot = spts.mujoco.dress(model, mujoco.MjData(model), pitch=0.02)
+    assert robot.names == dog[2].names and "trunk" in robot.names and robot.taxels == dog[2].taxels
+    assert spts.mujoco.dress(model, mujoco.MjData(model), ["trunk", "ball"], 0.02).names == ["trunk", "ball"]
+    alone = mujoco.MjModel.from_xml_string(f'<mujoco><worldbody><geom type="plane" size="1 1 1"/>{ball}</mujoco>')
+    with pytest.raises(ValueError, match="named"):
+        spts.mujoco.dress(alone, mujoco.MjData(alone))
 
 
 def test_what_cannot_be_dressed(dog):

@@ -142,13 +142,21 @@ class Threshold:
         return np.maximum(np.einsum("nmk,nm->nk", phi, y), 0)
 
 
+class Fitted(Threshold):
+    """Has `fit`, and is none of scikit-learn's: it is taken as it is."""
+
+    def fit(self, X, images):
+        raise RuntimeError("fitted again")
+
+
 def test_scores_on_sessions(sessions):
     """Own decoders, a fitted and an unfitted estimator, a classifier, and an object with nothing but `predict`."""
     fitted = spts.decoders.NnLmmse().fit()
-    named = {"fitted": fitted, "ridge": Ridge(1.0), "evidence": spts.decoders.Evidence(), "mine": Threshold()}
+    named = {"fitted": fitted, "ridge": Ridge(1.0), "evidence": spts.decoders.Evidence()}
+    named |= {"mine": Threshold(), "own": Fitted()}
     board = spts.score(named, sessions, measurements=[20])
     assert {row["decoder"] for row in board.rows} == set(named)
-    assert board.of("fitted", 20)["iou"] > board.of("mine", 20)["iou"] > 0
+    assert board.of("fitted", 20)["iou"] > board.of("mine", 20)["iou"] == board.of("own", 20)["iou"] > 0
     # two objects: which of them is a coin's toss for who knows nothing
     assert board.of("evidence", 20)["class_single"] > 0.9
     own = spts.score("nn_lmmse", sessions, measurements=[20])
@@ -173,6 +181,73 @@ def test_scores_on_sessions(sessions):
     assert own.rows == json.loads(by_command.stdout)["rows"]
 
 
+class Entrant:
+    """A class as `spts bench` runs it: the ridge of docs/benchmark.md."""
+
+    def fit(self, train):
+        assert train.images.shape == (len(train.labels), train.rows * train.cols) and train.measurements == [20]
+        self.c = train.images.T @ train.images / len(train.images)
+
+    def predict(self, phi, y):
+        s = phi @ self.c @ phi.T
+        s += 0.02 * np.trace(s) / len(y) * np.eye(len(y))
+        return np.maximum(self.c @ phi.T @ np.linalg.solve(s, y), 0).reshape(10, 10)
+
+
+class Named(Entrant):
+    def predict(self, phi, y):
+        return super().predict(phi, y), "T"
+
+
+class Projected:
+    """Learns nothing."""
+
+    def predict(self, rows, samples):
+        return np.maximum(rows.T @ samples, 0)
+
+
+def test_entrants_of_the_benchmark(sessions, data):
+    named = {"entrant": Entrant(), "named": Named(), "projected": Projected()}
+    board = spts.score({**named, "mine": Threshold()}, sessions, measurements=[20])
+    assert board.of("entrant", 20)["iou"] == board.of("named", 20)["iou"] > board.of("projected", 20)["iou"]
+    assert board.of("projected", 20)["iou"] == pytest.approx(board.of("mine", 20)["iou"])
+    # without a name, the class is that of the image that is most like it
+    assert board.of("entrant", 20)["class_single"] > board.of("named", 20)["class_single"] == 0.5
+    board = spts.score(named, data, measurements=[20])
+    assert board.of("entrant", 20)["iou"] > board.of("projected", 20)["iou"]
+    assert board.of("named", 20)["class_single"] == 0.0 and board.of("projected", 20)["learned_from"] == "given"
+    # they stay as they were
+    assert not vars(named["entrant"])
+
+
+def test_sessions_in_place_of_their_folder(sessions):
+    found = spts.load_all(sessions)
+    board = spts.score("nn_lmmse", found, measurements=[20])
+    assert board.rows == spts.score("nn_lmmse", sessions, measurements=[20]).rows
+    assert {line["object"] for line in spts.score("omp", found[0], measurements=[20]).objects} == {found[0].object}
+    for kind, given in ((ValueError, []), (TypeError, [1]), (TypeError, 5)):
+        with pytest.raises(kind, match="data"):
+            spts.score("omp", given)
+
+
+def test_an_object_with_predict_needs_no_scikit_learn(sessions):
+    code = f"""
+import sys
+sys.modules["sklearn"] = None
+import numpy as np, spts
+class Given:
+    def predict(self, X):
+        return X[:, 20:120]
+class Entrant:
+    def fit(self, train):
+        self.mean = train.images.mean(axis=0)
+    def predict(self, phi, y):
+        return self.mean
+spts.score([Given(), Entrant()], {str(sessions)!r}, measurements=[20])
+"""
+    subprocess.run([sys.executable, "-c", code], check=True)
+
+
 def test_an_estimator_that_fails_is_said(sessions):
     class Broken:
         def predict(self, X):
@@ -192,6 +267,7 @@ def test_an_estimator_that_fails_is_said(sessions):
     for text, arguments in [
         ("estimator", {"estimator": "best"}),
         ("predict", {"estimator": object()}),
+        ("class Short", {"estimator": Short}),
         ("names", {"estimator": ["omp", "omp"]}),
         ("learn_from", {"learn_from": "friends"}),
         ("measurements", {"measurements": [0]}),
@@ -223,7 +299,6 @@ def test_specs_and_refusals(tmp_path):
         ("workers", lambda: spts.dataset.make("random-shapes", tmp_path / "y", rows=100, workers=0)),
         ("colour", lambda: spts.dataset.make("random-shapes", tmp_path / "z", set={"colour": 1})),
         ("dataset.json", lambda: spts.Dataset(tmp_path / "nothing")),
-        ("MuJoCo", lambda: spts.dataset.make("drops", tmp_path / "d", rows=10)),
     ]:
         with pytest.raises(ValueError, match=text):
             call()

@@ -34,7 +34,7 @@ def simulate(program, folder):
 def draw(session, scene, path):
     """The three panels and the arrows between them."""
     phi, y = session.compressive.windows(0, M)
-    decoded = spts.decode(phi[0], y[0], shape=session.shape, decoder="nn_lmmse")
+    decoded = spts.decode(phi[0], y[0], shape=session.shape, decoder="amortised")
     _, scan = session.raster.windows(0, session.shape[0] * session.shape[1])
     truth = scan[0].reshape(session.shape)
 
@@ -51,7 +51,7 @@ def draw(session, scene, path):
     for side in ("top", "right"):
         wire.spines[side].set_visible(False)
     wire.tick_params(colors=INK, labelsize=8)
-    panels = [(0.692, decoded, f"decoded\nfrom {M} samples"), (0.85, truth, "scan of\n100 samples")]
+    panels = [(0.692, decoded, f"decoded from {M} sums\n(amortised)"), (0.85, truth, "scan of\n100 samples")]
     for x, image, label in panels:
         axes = figure.add_axes([x, 0.235, 0.143, 0.46])
         axes.imshow(image, cmap="magma", vmin=0)

@@ -1,3 +1,3 @@
-//! Nothing but its dependencies: crates of others, with every feature that any part of the repository turns on. Tests,
-//! examples and the Python package depend on it, and so share what Cargo builds; without it Cargo would build most
-//! crates again for each of them.
+//! Nothing but its dependencies: crates of others, with every feature that any part of the repository turns on. The
+//! command line and the examples depend on it, and so tests and the Python package: all share what Cargo builds, and a
+//! program writes the same bytes whichever of them it was built with.

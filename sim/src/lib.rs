@@ -10,13 +10,11 @@
 //! # Ok::<(), spts_input::Refusal>(())
 //! ```
 
+pub mod engine;
 pub mod fidelity;
 pub mod mechanics;
-#[cfg(feature = "engine")]
 pub mod render;
-#[cfg(feature = "engine")]
 pub mod world;
 
 pub use mechanics::Mechanics;
-#[cfg(feature = "engine")]
 pub use world::World;

@@ -32,11 +32,10 @@
 //!
 //! [`Scene::from_toml`] takes any skin, object, transducer and readout; [`SceneConfig`](scene::SceneConfig) lists the
 //! fields. Another simulator can pass its contact as [`Frame`]s to a [`Chain`], which records them. This needs no
-//! MuJoCo: the crate links MuJoCo only with the feature `mujoco`. A [`SessionSet`](data::SessionSet) opens folders of
-//! sessions and the recordings of the published skin.
+//! MuJoCo: its library is opened when a scene is simulated ([`sim::engine`]). A [`SessionSet`](data::SessionSet) opens
+//! folders of sessions and the recordings of the published skin.
 //!
-//! The crates behind this one are [`contact`], [`models`], [`circuit`], [`firmware`], [`recon`] and, with the feature
-//! `mujoco`, [`sim`].
+//! The crates behind this one are [`contact`], [`models`], [`circuit`], [`firmware`], [`recon`] and [`sim`].
 
 pub mod assign;
 pub mod chain;
@@ -46,19 +45,14 @@ pub mod device;
 pub mod output;
 pub mod progress;
 pub mod provenance;
-#[cfg(feature = "mujoco")]
 pub mod record;
-#[cfg(feature = "mujoco")]
 pub mod scene;
 pub mod session;
-#[cfg(feature = "mujoco")]
 pub mod simulate;
 mod wire;
 
 pub use chain::{Acquisition, Chain, ChainConfig};
-#[cfg(feature = "mujoco")]
 pub use record::Twin;
-#[cfg(feature = "mujoco")]
 pub use scene::Scene;
 pub use session::{PressFacts, Recorded, Session};
 pub use wire::{Pressed, Wire};
@@ -73,7 +67,6 @@ pub use spts_contact as contact;
 pub use spts_firmware as firmware;
 pub use spts_models as models;
 pub use spts_recon as recon;
-#[cfg(feature = "mujoco")]
 pub use spts_sim as sim;
 
 /// The examples of the README are compiled with the documentation tests.

@@ -1,11 +1,7 @@
 //! Provenance of a result, which every result file carries, and the machine, on which no result depends.
 
 use serde::{Deserialize, Serialize};
-#[cfg(feature = "mujoco")]
-use spts_sim::world::MUJOCO_VERSION;
-/// Version of a build without MuJoCo.
-#[cfg(not(feature = "mujoco"))]
-const MUJOCO_VERSION: &str = "none";
+use spts_sim::engine::MUJOCO_VERSION;
 
 /// Everything on which a result depends. It is the same on every machine and for any number of threads.
 #[derive(Debug, Clone, PartialEq, Eq, Serialize, Deserialize)]
@@ -19,7 +15,7 @@ pub struct Provenance {
     pub version: String,
     /// Revision of the sources, with `-dirty` if they were changed afterwards; `unknown` outside a repository.
     pub git_revision: String,
-    /// Version of MuJoCo; `none` in a build without it.
+    /// Version of MuJoCo that simulates scenes.
     pub mujoco_version: String,
 }
 

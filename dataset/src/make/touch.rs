@@ -249,14 +249,3 @@ impl Moving {
         (pressure, from_m + share * (to_m - from_m))
     }
 }
-
-#[cfg(not(feature = "mujoco"))]
-impl Moving {
-    /// Refuses: there is no engine to follow anything with.
-    pub(super) fn new(_: &Spec, _: &Choice, _: Streams, _: u64) -> Result<Self, Refusal> {
-        Err(Refusal::new(
-            "`record.what` is not \"hold\", or the contact field does not balance: motion in time needs MuJoCo, which this \
-             build lacks",
-        ))
-    }
-}

@@ -3,8 +3,8 @@
 use crate::Bars;
 use crate::context::{Common, note, notes, open_folder, print, print_json};
 use crate::error::CliError;
-use crate::extras::{simulated_presses, write_decoded};
 use crate::options::{decoders_named, network, seed, skin_gains, sorted, whole};
+use crate::simulated::simulated_presses;
 use clap::Args;
 use serde::Serialize;
 use spts::Session;
@@ -160,7 +160,7 @@ impl DecodeCommand {
         } else {
             print(&table(&decoded))?;
         }
-        write_decoded(&decoded, out)?;
+        spts_report::decode::write(&decoded, out)?;
         if !self.common.json {
             print(&format!("results: {}", self.out.display()))?;
         }

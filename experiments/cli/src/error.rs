@@ -1,6 +1,5 @@
 //! Why a command failed.
 
-use crate::extras::COMMANDS_ELSEWHERE;
 use clap::error::{ContextKind, ContextValue, ErrorKind};
 use spts_input::Refusal;
 use std::error::Error;
@@ -74,18 +73,10 @@ pub fn refusal(error: &clap::Error) -> Option<String> {
         }
         _ => {
             let said = error.render().to_string();
-            let (said, usage) = said.split_once("\n\nUsage: ").unwrap_or((&said, ""));
+            let said = said.split("\n\nUsage: ").next().unwrap_or_default();
             let said = said.split("\n\nFor more information").next().unwrap_or_default();
             let said = said.strip_prefix("error: ").unwrap_or(said);
-            let said = one_line(said).replace(":; ", ": ");
-            let elsewhere = match error.kind() {
-                // of `spts` itself, and not of a command that is here
-                ErrorKind::InvalidSubcommand if usage.starts_with("spts <") || usage.starts_with("spts [") => {
-                    COMMANDS_ELSEWHERE
-                }
-                _ => "",
-            };
-            Some(format!("{said}{elsewhere}"))
+            Some(one_line(said).replace(":; ", ": "))
         }
     }
 }

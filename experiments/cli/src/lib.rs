@@ -1,57 +1,35 @@
 //! The commands of `spts`.
 
-#[cfg(feature = "full")]
 mod bench;
-#[cfg(feature = "full")]
 mod budget;
-#[cfg(feature = "full")]
 mod calibrate;
-#[cfg(feature = "full")]
 mod circuit;
-#[cfg(feature = "full")]
 mod compare;
 mod context;
 mod dataset;
 mod decode;
-#[cfg(feature = "full")]
 mod design;
 mod device;
 mod error;
-#[cfg(feature = "full")]
 mod fidelity;
-#[cfg(feature = "full")]
 mod firmware;
-#[cfg(feature = "full")]
-mod full;
 mod import;
-#[cfg(feature = "full")]
 mod live;
-#[cfg_attr(not(feature = "full"), expect(dead_code, reason = "some belong to commands that are left out"))]
 mod options;
 mod record;
-#[cfg(feature = "full")]
 mod reproduce;
 mod score;
-#[cfg(feature = "full")]
 mod sensing;
-#[cfg(feature = "full")]
 mod simulate;
-#[cfg(feature = "full")]
+mod simulated;
 mod validate;
-#[cfg(feature = "full")]
 mod wire;
-#[cfg(not(feature = "full"))]
-mod without;
 
 use clap::{CommandFactory as _, FromArgMatches as _, Parser, Subcommand};
 pub use context::{Bars, Common, note, note_error};
 pub use error::{CliError, refusal};
-#[cfg(feature = "full")]
-use full as extras;
 use std::ffi::OsString;
 use std::io::IsTerminal as _;
-#[cfg(not(feature = "full"))]
-use without as extras;
 
 /// Digital twin of the single-pixel tactile skin: simulate contacts, record them through the one-wire readout,
 /// reconstruct and score them beside recordings of the real skin.
@@ -64,52 +42,38 @@ pub struct Cli {
 
 /// Makes the list of commands, and runs the one that was asked for.
 macro_rules! commands {
-    ($($(#[$when:meta])? $name:ident($command:ty),)*) => {
+    ($($name:ident($command:ty),)*) => {
         #[derive(Debug, Subcommand)]
         enum Command {
-            $($(#[$when])? $name($command),)*
+            $($name($command),)*
         }
 
         impl Command {
             fn run(self) -> Result<(), CliError> {
                 match self {
-                    $($(#[$when])? Self::$name(command) => command.run(),)*
+                    $(Self::$name(command) => command.run(),)*
                 }
             }
         }
     };
 }
 
-// in the order of the help; those behind a feature need the physics engine, the studies or the figures
+// in the order of the help
 commands! {
-    #[cfg(feature = "full")]
     Simulate(Box<simulate::SimulateCommand>),
-    #[cfg(feature = "full")]
     Validate(validate::ValidateCommand),
-    #[cfg(feature = "full")]
     Reproduce(reproduce::ReproduceCommand),
-    #[cfg(feature = "full")]
     Fidelity(fidelity::FidelityCommand),
-    #[cfg(feature = "full")]
     Calibrate(calibrate::CalibrateCommand),
-    #[cfg(feature = "full")]
     Compare(compare::CompareCommand),
-    #[cfg(feature = "full")]
     Bench(bench::BenchCommand),
-    #[cfg(feature = "full")]
     Budget(budget::BudgetCommand),
-    #[cfg(feature = "full")]
     Circuit(circuit::CircuitCommand),
-    #[cfg(feature = "full")]
     Design(Box<design::DesignCommand>),
-    #[cfg(feature = "full")]
     Firmware(firmware::FirmwareCommand),
-    #[cfg(feature = "full")]
     Live(live::LiveCommand),
-    #[cfg(feature = "full")]
     Sensing(Box<sensing::SensingCommand>),
     Import(import::ImportCommand),
-    #[cfg(feature = "full")]
     Wire(wire::WireCommand),
     Decode(decode::DecodeCommand),
     Score(score::ScoreCommand),

@@ -3,10 +3,10 @@
 use crate::Bars;
 use crate::context::{Common, note, notes, open_folder, print, progress};
 use crate::error::CliError;
-use crate::extras::{simulated_presses, simulated_sessions, write_anytime, write_board, write_in_time};
 use crate::options::{
     decoders_named, network, number, seed, sensing, skin_gains, sorted, sorted_numbers, whole, within,
 };
+use crate::simulated::{simulated_presses, simulated_sessions};
 use clap::Args;
 use serde::Serialize;
 use spts::output::{OutputFolder, check_replaceable, write_json};
@@ -272,7 +272,7 @@ impl ScoreCommand {
         let apart = before.as_ref().map(|before| differences(before, &board));
         let shown = BoardOutput { board: &board, regressions: found.as_deref(), differences: apart.as_deref() };
         self.finish(&shown, table(&board), || {
-            write_board(&board, out)?;
+            spts_report::score::write(&board, out)?;
             self.save.as_deref().map_or(Ok(()), |path| write_json(path, &board))
         })?;
         if let Some(file) = &self.against {
@@ -289,7 +289,7 @@ impl ScoreCommand {
             Some(no_confidence(unable.name).to_string())
         };
         let (board, out) = self.scored(&can, |ready, bars| ready.stops(&wanted, &|| bars.step()))?;
-        self.finish(&board, anytime::table(&board), || write_anytime(&board, out))
+        self.finish(&board, anytime::table(&board), || spts_report::score::write_anytime(&board, out))
     }
 
     /// Runs the command with `--in-time`.
@@ -302,7 +302,7 @@ impl ScoreCommand {
             (settings.sensing != [Sensing::Random]).then(|| reason.to_owned())
         };
         let (board, out) = self.scored(&can, |ready, bars| ready.in_time(&|| bars.step()))?;
-        self.finish(&board, in_time::table(&board), || write_in_time(&board, out))
+        self.finish(&board, in_time::table(&board), || spts_report::score::write_in_time(&board, out))
     }
 
     /// A board by `score`, and the folder for it, unless `refused` has a reason against the settings.

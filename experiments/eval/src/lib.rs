@@ -21,7 +21,6 @@ mod published;
 mod scorer;
 mod sensing;
 mod session;
-#[cfg(feature = "mujoco")]
 mod skin_run;
 mod source;
 mod table;
@@ -39,7 +38,6 @@ pub use published::{BaselineRow, ScoreRow, SkinScores, baselines, mean_rows, sco
 pub use scorer::{Scorer, decode_us};
 pub use sensing::{RowChooser, Sensing};
 pub use session::ScoredSession;
-#[cfg(feature = "mujoco")]
 pub use skin_run::{SkinRun, SkinRunPresses, TwinSessions, footprint_scene, twin_set};
 pub use source::{PublishedSkin, ScoredSkin, Source, check_session};
 pub use table::{Cell, Table, TextTable, escape};

@@ -21,7 +21,6 @@ mod timestep;
 
 pub use bend::BendConfig;
 pub use press::{DropConfig, MAX_LIDDED_TILT_DEG, PressConfig, PressedObject};
-#[cfg(feature = "engine")]
 pub(crate) use press::{RAMP_CORNER, ramp_s};
 pub use scene::{
     ARM_MASS_KG, Expected, FLIGHT_INTERVAL_S, GRAVITY_M_PER_S2, Mechanics, MechanicsConfig, Overhang, Task,

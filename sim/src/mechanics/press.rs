@@ -279,7 +279,6 @@ impl PressConfig {
     }
 
     /// Where press `index` is.
-    #[cfg(feature = "engine")]
     pub(crate) fn placement_of(&self, index: u64) -> Placement {
         let place = self.placement();
         let places = self.places.as_deref().filter(|places| !places.is_empty());

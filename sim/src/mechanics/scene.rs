@@ -4,7 +4,6 @@ use super::bend::BendConfig;
 use super::press::{DropConfig, PressConfig};
 use super::timestep::{LONGEST_STEP_S, SHORTEST_STEP_S, StepLimit, Timestep, impact_damping};
 use crate::fidelity::{Courses, FidelityChoice, FidelityLevel, Tolerance, change_model, choose};
-#[cfg(feature = "engine")]
 use crate::world::apart;
 use serde::{Deserialize, Serialize};
 use spts_contact::mesh::{MeshReport, TriMesh, sphere};
@@ -99,10 +98,8 @@ impl MechanicsConfig {
             level.apply(&mut config.contact, cells);
             level.coupled.is_none() || Mechanics::build(config, folder, given.cloned()).is_ok()
         };
-        // without the engine there are no courses
-        #[cfg(not(feature = "engine"))]
-        let courses = |_: Courses| f64::INFINITY;
-        #[cfg(feature = "engine")]
+        // courses need the engine, and a choice without them would be another one
+        crate::engine::open()?;
         let courses = |courses: Courses| {
             let at = |level: &str, cells: usize| {
                 let mut config = Self { timestep_s: Some(Timestep::Auto), ..self.clone() };

@@ -35,7 +35,6 @@ use spts_input::Refusal;
 
 pub use drop::Bounce;
 pub use dynamics::no_pressure;
-pub use model::MUJOCO_VERSION;
 pub use press::{PressCourse, no_touch};
 
 /// A press or drop of a scene, simulated from frame to frame.

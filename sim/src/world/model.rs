@@ -168,9 +168,6 @@ fn links() -> impl Iterator<Item = &'static str> {
     links.skip(1).map(|link| link.split_once("-->").map_or("", |(_, shapes)| shapes.trim()))
 }
 
-/// MuJoCo version for which this crate is made.
-pub const MUJOCO_VERSION: &str = "3.17.0";
-
 /// Name of the body that meets the skin.
 pub(crate) const BODY: &str = "body";
 
@@ -184,10 +181,7 @@ pub(crate) fn tool_length_m(mesh: &TriMesh) -> f64 {
 
 /// Compiles the model; with `visuals`, everything a picture needs is in it too.
 pub(crate) fn compile(scene: &Mechanics, visuals: Option<&Visuals>) -> Result<MjModel, Refusal> {
-    let found = mujoco_rs::mujoco_version();
-    if found != MUJOCO_VERSION {
-        return Err(Refusal::new(format!("MuJoCo {found} is linked, {MUJOCO_VERSION} is needed")));
-    }
+    crate::engine::open()?;
     MjModel::from_xml_string(&mjcf(scene, visuals)).map_err(|error| rejected(&error.to_string()))
 }
 

@@ -2,7 +2,6 @@
 
 mod look;
 mod make;
-#[cfg(feature = "full")]
 mod pictures;
 
 use crate::error::CliError;
@@ -47,9 +46,7 @@ enum Action {
     Head(look::HeadCommand),
     Schema(look::SchemaCommand),
     Specs(look::SpecsCommand),
-    #[cfg(feature = "full")]
     Preview(pictures::PreviewCommand),
-    #[cfg(feature = "full")]
     Shapes(pictures::ShapesCommand),
 }
 
@@ -68,9 +65,7 @@ impl DatasetCommand {
             Action::Head(command) => command.run(),
             Action::Schema(command) => command.run(),
             Action::Specs(command) => command.run(),
-            #[cfg(feature = "full")]
             Action::Preview(command) => command.run(),
-            #[cfg(feature = "full")]
             Action::Shapes(command) => command.run(),
         }
     }

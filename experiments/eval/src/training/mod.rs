@@ -5,7 +5,6 @@ mod gains;
 mod network;
 mod presses;
 mod shapes;
-#[cfg(feature = "mujoco")]
 mod skins;
 
 pub use data::{Dictionary, Kinds, Learned, Learning, SHIFT_REACH, TrainingData};
@@ -13,7 +12,6 @@ pub use gains::{BAND_SD, GainCheck, SkinGains, gain_sds, on_skins_with, simulate
 pub use network::TrainedNetwork;
 pub use presses::{TrainingPresses, library, prior_images, templates, training_images};
 pub use shapes::{PoseKnowledge, PosedObject, SHAPES_SPEC, shape_images};
-#[cfg(feature = "mujoco")]
 pub use skins::Skins;
 
 use crate::session::ScoredSession;

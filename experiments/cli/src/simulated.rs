@@ -1,4 +1,4 @@
-//! What commands take from the physics engine and the figures; without them it is as in `without.rs`.
+//! Sessions that commands simulate before they learn from them or score them.
 
 use crate::context::progress;
 use crate::error::CliError;
@@ -6,12 +6,6 @@ use spts_contact::objects::OBJECTS;
 use spts_eval::training::Skins;
 use spts_eval::{ScoredSession, Source, TwinSessions};
 use spts_models::SkinLayout;
-
-pub(crate) use spts_report::decode::write as write_decoded;
-pub(crate) use spts_report::score::{write as write_board, write_anytime, write_in_time};
-
-/// Where the commands are that this program lacks: it has all.
-pub(crate) const COMMANDS_ELSEWHERE: &str = "";
 
 /// Sessions of `scenes`, simulated now.
 pub(crate) fn simulated_sessions(scenes: &[String], seed: u64, quick: bool) -> Result<Source, CliError> {

@@ -1,6 +1,7 @@
 //! Scenes from their name to a session.
 
 use crate::common::{refuse, stoppable, table};
+use pyo3::exceptions::PyImportError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use spts::Mode;
@@ -8,8 +9,21 @@ use spts::Refusal;
 use spts::assign::Assignment;
 use spts::output::OutputFolder;
 use spts::session::SessionWriter;
+use spts::sim::engine;
 use spts::simulate::{Request, run};
 use std::path::PathBuf;
+
+/// Looks for MuJoCo's library in `folder`, too.
+#[pyfunction]
+pub(crate) fn look_in(folder: PathBuf) {
+    engine::look_in(folder);
+}
+
+/// Opens MuJoCo's library; an `ImportError` where there is none of its version.
+#[pyfunction]
+pub(crate) fn open_mujoco() -> PyResult<()> {
+    engine::open().map_err(|error| PyImportError::new_err(error.to_string()))
+}
 
 /// Simulates `scene`, changed by `set`, and writes its session into `out`; notes that the user should read.
 #[pyfunction]

@@ -1,0 +1,10 @@
+# Sourced with a TARGET of Linux: sees to a compiler that has its standard library. rustup's when it has it or can fetch
+# it; else Debian's, whose package libstd-rust-web-dev has one for each of its architectures.
+if ! [ -d "$(rustc --print sysroot)/lib/rustlib/$1/lib" ] && ! rustup target add "$1" >/dev/null 2>&1; then
+  if [ -d "/usr/lib/rustlib/$1/lib" ]; then
+    export RUSTC=/usr/bin/rustc
+  else
+    echo "no standard library for $1: \`rustup target add $1\`, or Debian's rustc-web with libstd-rust-web-dev:arm64" >&2
+    exit 1
+  fi
+fi
