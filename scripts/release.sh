@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The programs of a release beside its wheels: release.sh TOOLS FOLDER TARGET... For each target of Linux an archive
-# with `spts`, which asks for glibc 2.17 and no library but the system's own, and for all of them the licences of what is
-# linked and the SHA-256 of every file. TOOLS is the virtual environment of python/build-requirements.txt.
+# with `spts`, which asks for glibc 2.17 and no library but the system's own, and for all of them the licences of what
+# is linked and the SHA-256 of every file. TOOLS is the virtual environment of python/build-requirements.txt.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 tools=$(realpath "$1")

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
-# Tries a release where nothing else is: smoke.sh FOLDER. Lays Debian's smallest system and its Python into an empty root
-# (debootstrap, as root), unpacks the archive and installs the wheel there without a network, and runs both: their data
-# sets, and that of target/release/spts where it is built, must have the same digest.
+# Tries a release where nothing else is: smoke.sh FOLDER. Lays Debian's smallest system and its Python into an empty
+# root (debootstrap, as root), unpacks the archive and installs the wheel there without a network, and runs both: their
+# data sets, and that of target/release/spts where it is built, must have the same digest.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 folder=$(realpath "$1")
