@@ -1,19 +1,28 @@
 #!/usr/bin/env bash
 # Tries a release where nothing else is: smoke.sh FOLDER. Lays Debian's smallest system and its Python into an empty
-# root (debootstrap, as root), unpacks the archive and installs the wheel there without a network, and runs both: their
-# data sets, and that of target/release/spts where it is built, must have the same digest.
+# root (debootstrap, as root), unpacks the archive and installs the wheel there without a network, and runs both. Where
+# qemu-aarch64-static is installed, the wheel for aarch64 runs in it, on the Python of that Debian. All data sets,
+# and that of target/release/spts where it is built, must have the same digest.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 folder=$(realpath "$1")
-root=$(mktemp -d)
-trap 'rm -rf "$root"' EXIT
+work=$(mktemp -d)
+trap 'rm -rf "$work"' EXIT
+root=$work/x86_64
+# system FOLDER ARGUMENT...: Debian's smallest system with a Python
+system() {
+  debootstrap --variant=minbase --include=python3-venv "${@:2}" bookworm "$1" >"$work/log" || { tail -n 5 "$work/log" >&2; exit 1; }
+}
+# wheels MACHINE FOLDER: NumPy's wheel, and the release's
+wheels() {
+  mkdir -p "$2"
+  cp "$folder"/spts_twin-*"$1".whl "$2"
+  python3 -m pip download --quiet --disable-pip-version-check --only-binary=:all: --python-version 3.11 \
+    --platform "manylinux_2_28_$1" --platform "manylinux2014_$1" --dest "$2" numpy
+}
 
-debootstrap --variant=minbase --include=python3-venv bookworm "$root" >"$root.log" || { tail -n 5 "$root.log" >&2; exit 1; }
-rm -f "$root.log"
-mkdir "$root/wheels"
-cp "$folder"/spts_twin-*x86_64.whl "$root/wheels"
-python3 -m pip download --quiet --disable-pip-version-check --only-binary=:all: --python-version 3.11 \
-  --platform manylinux_2_28_x86_64 --platform manylinux2014_x86_64 --dest "$root/wheels" numpy
+system "$root"
+wheels x86_64 "$root/wheels"
 tar -xzf "$folder"/spts-*-x86_64-linux.tar.gz --directory "$root/opt"
 inside() { chroot "$root" /usr/bin/env -i HOME=/root LANG=C.UTF-8 PATH=/venv/bin:/usr/bin:/bin "$@"; }
 digest() { sed -n 's/^digest: //p'; }
@@ -27,8 +36,19 @@ inside "/$program" firmware verify --edges 200 | tail -n 1
 inside "/$program" design --area 0.15x0.15 --resolution 15mm --latency 2ms --iou 0.7 --objects large --out /design | sed -n '/^expected/p'
 inside python3 -c 'import spts; print(spts.Skin(rows=10, cols=10, pitch=0.015))'
 found=("$(inside "/$program" "${shapes[@]}" /by_program | digest)" "$(inside spts "${shapes[@]}" /by_wheel | digest)")
+if command -v qemu-aarch64-static >/dev/null && ls "$folder"/spts_twin-*aarch64.whl >/dev/null 2>&1; then
+  arm=$work/aarch64
+  # its programs cannot install it: it is unpacked
+  system "$arm" --arch=arm64 --foreign
+  for package in "$arm"/var/cache/apt/archives/*.deb; do dpkg --extract "$package" "$arm"; done
+  wheels aarch64 "$work/arm_wheels"
+  for wheel in "$work"/arm_wheels/*.whl; do python3 -m zipfile --extract "$wheel" "$work/site"; done
+  emulated() { qemu-aarch64-static -L "$arm" -E PYTHONHOME="$arm/usr" -E PYTHONPATH="$work/site" "$arm/usr/bin/python3.11" "$@"; }
+  emulated -c 'import platform, spts; print(platform.machine(), spts.Skin(rows=10, cols=10, pitch=0.015))'
+  found+=("$(emulated -m spts "${shapes[@]}" "$work/by_aarch64" | digest)")
+fi
 if [ -x target/release/spts ]; then
-  found+=("$(target/release/spts "${shapes[@]}" "$root/by_clone" | digest)")
+  found+=("$(target/release/spts "${shapes[@]}" "$work/by_clone" | digest)")
 fi
 printf '%s\n' "${found[@]}"
 [ "$(printf '%s\n' "${found[@]}" | sort -u | wc -l)" = 1 ] || { echo "smoke: the digests differ" >&2; exit 1; }

@@ -21,7 +21,8 @@ def support_accuracy(images, truths):
     Parameters
     ----------
     images, truths : ndarray (n, taxels), (n, rows, cols) or (taxels,)
-        Of the same shape. One image of rows and columns is `image[None]`, as an array with two axes holds one image a row.
+        Of the same shape. One image of rows and columns is `image[None]`: an array with two axes holds one image a
+        row.
 
     Returns
     -------
@@ -48,8 +49,8 @@ def _pairs(images, truths):
     count = 1 if images.ndim == 1 else len(images)
     if images.ndim == 2 and min(images.shape) > 1 and (max(images.shape) <= _SIDE or count == images.shape[1]):
         warnings.warn(
-            f"`images` has shape {images.shape}: it is scored as {count} images of {images.shape[1]} taxels. One image of "
-            f"{count} x {images.shape[1]} taxels is `image[None]`; `images[:, None]` ends this warning",
+            f"`images` has shape {images.shape}: it is scored as {count} images of {images.shape[1]} taxels. One image "
+            f"of {count} x {images.shape[1]} taxels is `image[None]`; `images[:, None]` ends this warning",
             stacklevel=3,
         )
     return images.reshape(count, -1), truths.reshape(count, -1)

@@ -547,8 +547,8 @@ def dress(
     data : mujoco.MjData
         Taxels inside the geoms of other links, as they stand in this data, are left out.
     links : "all" or sequence of str or int
-        Bodies; "all" are those with a geom that collides, but the world, what is welded to it, and loose objects: bodies
-        on a free joint that have no child, such as a ball. With `taxels` or `sites` "all" are those that they name.
+        Bodies; "all" are those with a geom that collides, but the world, what is welded to it, and loose objects:
+        bodies on a free joint that have no child, such as a ball. With `taxels` or `sites` "all" are those that they name.
     pitch : float, optional
         Distance between taxels, m, [1e-4, 1]; default 0.01. With `taxels` or `sites`, those without an area have the
         square of it; by default, their share of the surface among their neighbours.
@@ -624,8 +624,8 @@ def dress(
         links = list(placed)
     if not links:
         raise ValueError(
-            "`links` is empty: the model has no moving body with a geom that collides, or loose objects alone, which are to "
-            "be named"
+            "`links` is empty: the model has no moving body with a geom that collides, or loose objects alone, "
+            "which have to be named"
         )
     if data.time == 0.0 and not data.xmat.any():
         mujoco.mj_kinematics(model, data)

@@ -96,7 +96,7 @@ def test_errors(engine):
 @pytest.mark.parametrize("shared", ["nothing", "mujoco", "all"])
 @pytest.mark.parametrize("first", ["spts", "mujoco"])
 def test_each_calls_its_own_version(alone, first, shared):
-    """Scenes and Python's MuJoCo in one process, in either order: both find what they find alone, whatever is GLOBAL."""
+    """Scenes and Python's MuJoCo in one process, in either order: both find what they find alone."""
     scene, ball = "import spts\n" + SCENE, f"import mujoco{BALL}"
     scene, ball = scene if shared != "all" else GLOBAL + scene, ball if shared == "nothing" else GLOBAL + ball
     code, found = (ball + scene + BALL, (1, 0, 1)) if first == "mujoco" else (scene + ball + SCENE, (0, 1, 0))

@@ -58,6 +58,10 @@ macro_rules! functions {
             use super::*;
 
             $(
+                // for this program or extension alone: another MuJoCo in the process keeps its own
+                #[cfg(target_os = "linux")]
+                std::arch::global_asm!(concat!(".hidden ", stringify!($name)));
+
                 // SAFETY: no other definition has this name, for `mujoco-rs` links none
                 #[unsafe(no_mangle)]
                 unsafe extern "C" fn $name($($argument: $type),*) $(-> $result)? {
@@ -138,8 +142,7 @@ fn functions_of(file: &Path) -> Result<Functions, Refusal> {
              the Python package, and {PATH_VARIABLE} may name its {FILE} anywhere"
         ))
     };
-    // SAFETY: MuJoCo's initialisers have no conditions
-    let library = unsafe { Library::new(file) }.map_err(|error| match other_version() {
+    let library = opened(file).map_err(|error| match other_version() {
         _ if file.components().count() > 1 => refused(&format!("{} cannot be opened: {error}", file.display())),
         Some(other) => refused(&format!("{} is another", other.display())),
         None => refused("it is not found"),
@@ -150,6 +153,24 @@ fn functions_of(file: &Path) -> Result<Functions, Refusal> {
     // SAFETY: it takes nothing, and answers a text that stays
     let found = unsafe { CStr::from_ptr((functions.mj_versionString)()) }.to_string_lossy();
     if found == MUJOCO_VERSION { Ok(functions) } else { Err(refused(&format!("{} is {found}", file.display()))) }
+}
+
+/// The library `file`, which sees its own functions before those of another MuJoCo in the same process.
+#[expect(unsafe_code, reason = "a C library")]
+fn opened(file: &Path) -> Result<Library, libloading::Error> {
+    #[cfg(all(target_os = "linux", target_env = "gnu"))]
+    // SAFETY: MuJoCo's initialisers have no conditions
+    unsafe {
+        use libloading::os::unix::{Library as UnixLibrary, RTLD_LOCAL, RTLD_NOW};
+        /// `RTLD_DEEPBIND` of the GNU C library.
+        const DEEP_BIND: std::ffi::c_int = 8;
+        UnixLibrary::open(Some(file), RTLD_NOW | RTLD_LOCAL | DEEP_BIND).map(Library::from)
+    }
+    #[cfg(not(all(target_os = "linux", target_env = "gnu")))]
+    // SAFETY: as above
+    unsafe {
+        Library::new(file)
+    }
 }
 
 /// A library of MuJoCo of another version, in a folder of [`look_in`].
