@@ -40,19 +40,20 @@ readers: setup
 	"$(READERS)/bin/python" -m pytest $(PARALLEL) --quiet --tb=short -rs --disable-warnings -p no:cacheprovider scripts/dataset
 
 # The wheel of the Python package `spts` for this machine, in out/wheels: two minutes after `make demo`.
-TOOLS ?= out/tools
+MATURIN ?= out/maturin
 WHEELS ?= out/wheels
 wheel: setup
-	./scripts/environment.sh "$(TOOLS)" python/build-requirements.txt
-	./scripts/wheel.sh "$(TOOLS)" "$(WHEELS)"
+	./scripts/environment.sh "$(MATURIN)" python/build-requirements.txt
+	./scripts/wheel.sh "$(MATURIN)" "$(WHEELS)"
 
 # What a release gives away, in out/release: wheels and programs for Linux from glibc 2.17 on, the licences of what is
 # in them, and SHA-256. `make wheels` builds the wheels alone. A quarter of an hour a target on two cores. `make smoke`
 # tries them in an empty Debian, as root.
+TOOLS ?= out/tools
 RELEASE ?= out/release
 TARGETS ?= x86_64-unknown-linux-gnu aarch64-unknown-linux-gnu
 wheels:
-	./scripts/environment.sh "$(TOOLS)" python/build-requirements.txt
+	./scripts/environment.sh "$(TOOLS)" python/release-requirements.txt
 	./scripts/wheel.sh "$(TOOLS)" "$(RELEASE)" $(TARGETS)
 
 release: wheels

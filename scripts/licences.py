@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Prints what the program and the wheel are made of, as CSV: crate, version, licence, and where its source is.
 
-`python3 scripts/licences.py TARGET...`, a target as x86_64-unknown-linux-gnu. What only tests and builds use is left
-out.
+`python3 scripts/licences.py TARGET...`, a target as x86_64-unknown-linux-gnu. What only tests and build scripts use is
+left out.
 """
 
 import csv

@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # The programs of a release beside its wheels: release.sh TOOLS FOLDER TARGET... For each target of Linux an archive
 # with `spts`, which asks for glibc 2.17 and no library but the system's own, and for all of them the licences of what
-# is linked and the SHA-256 of every file. TOOLS is the virtual environment of python/build-requirements.txt.
+# is linked and the SHA-256 of every file. TOOLS is the virtual environment of python/release-requirements.txt.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 tools=$(realpath "$1")
@@ -10,6 +10,7 @@ shift 2
 export PATH="$tools/bin:$PATH"
 version=$(sed -n '/^\[workspace.package\]/,/^$/s/^version = "\(.*\)"/\1/p' Cargo.toml)
 
+rm -f "$folder"/spts-*.tar.gz
 for target in "$@"; do
   (
     . scripts/cross.sh "$target"

@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
-# Builds wheels of the Python package: wheel.sh TOOLS FOLDER [TARGET...]. TOOLS is the virtual environment of
-# python/build-requirements.txt. Without a TARGET, one for this machine, of what the workspace has built. With targets,
-# those of a release: for Linux (x86_64-unknown-linux-gnu, aarch64-unknown-linux-gnu) zig links them for glibc 2.17, and
-# auditwheel says that they ask for no more; one for macOS is built on macOS.
+# Builds wheels of the Python package: wheel.sh TOOLS FOLDER [TARGET...]. TOOLS is a virtual environment. Without a
+# TARGET, it has python/build-requirements.txt, and the wheel is for this machine, of what the workspace has built. With
+# targets, it has python/release-requirements.txt: for Linux (x86_64-unknown-linux-gnu, aarch64-unknown-linux-gnu) zig
+# links the wheels for glibc 2.17, and auditwheel says that they ask for no more.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 tools=$(realpath "$1")
@@ -18,17 +18,14 @@ if [ $# = 0 ]; then
   exit
 fi
 for target in "$@"; do
-  case $target in
-    *-linux-gnu)
-      # a compiler of its own for each target
-      (
-        . scripts/cross.sh "$target"
-        "${build[@]}" --profile dist --target "$target" --target-dir target/dist --zig --compatibility manylinux2014
-      )
-      auditwheel show "$folder"/spts_twin-*manylinux_2_17_"${target%%-*}"*.whl | tr '\n' ' ' | grep -q 'manylinux_2_17' || {
-        echo "wheel: the wheel for $target asks for more than manylinux2014 has" >&2
-        exit 1
-      } ;;
-    *) "${build[@]}" --profile dist --target "$target" --target-dir target/dist ;;
-  esac
+  rm -f "$folder"/spts_twin-*"${target%%-*}".whl
+  # a compiler of its own for each target
+  (
+    . scripts/cross.sh "$target"
+    "${build[@]}" --profile dist --target "$target" --target-dir target/dist --zig --compatibility manylinux2014
+  )
+  auditwheel show "$folder"/spts_twin-*"${target%%-*}".whl | tr '\n' ' ' | grep -q 'tag: *"manylinux_2_17_' || {
+    echo "wheel: the wheel for $target asks for more than manylinux2014 has" >&2
+    exit 1
+  }
 done

@@ -1,16 +1,14 @@
-//! What the library draws in: a robot's program needs no command line, no pictures and, for contact alone, no physics
-//! engine.
+//! What the library draws in: a robot's program needs no command line and no pictures, and contact no physics engine.
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use std::process::Command;
 
-/// Names of the packages that `package` is built from, tests aside, with the further arguments `features`.
-fn packages(package: &str, features: &[&str]) -> BTreeSet<String> {
+/// Names of the packages that `package` is built from, tests aside.
+fn packages(package: &str) -> BTreeSet<String> {
     let output = Command::new(env!("CARGO"))
         .args(["tree", "--offline", "--locked", "--edges", "normal", "--prefix", "none"])
         .args(["--package", package])
-        .args(features)
         .current_dir(env!("CARGO_MANIFEST_DIR"))
         .output()
         .expect("cargo can be started");
@@ -25,20 +23,19 @@ fn the_library_is_free_of_what_its_users_do_not_need() {
     const TERMINAL: [&str; 3] = ["clap", "indicatif", "plotters"];
     const ENGINE: [&str; 2] = ["mujoco-rs", "spts-sim"];
     let no_engine = [&TERMINAL[..], &ENGINE].concat();
-    for (package, features, without) in [
-        ("spts", &[][..], &TERMINAL[..]),
-        ("spts", &["--no-default-features"], &no_engine),
-        ("spts-contact", &[], &no_engine),
-        ("spts-recon", &[], &["spts-models", "spts-circuit", "mujoco-rs"]),
+    for (package, without) in [
+        ("spts", &TERMINAL[..]),
+        ("spts-contact", &no_engine),
+        ("spts-recon", &["spts-models", "spts-circuit", "mujoco-rs"]),
     ] {
-        let found = packages(package, features);
+        let found = packages(package);
         assert!(found.contains(package), "{found:?}");
         for name in without {
-            assert!(!found.contains(*name), "{package} {features:?} needs {name}");
+            assert!(!found.contains(*name), "{package} needs {name}");
         }
     }
-    // the names are right: with its default features the library has the engine
-    assert!(packages("spts", &[]).contains("mujoco-rs"));
+    // the names are right: the library has the engine
+    assert!(packages("spts").contains("mujoco-rs"));
 }
 
 /// The Python package is built beside the workspace: with other versions it would be built from nothing, and of other

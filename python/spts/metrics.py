@@ -31,7 +31,7 @@ def support_accuracy(images, truths):
     Warns
     -----
     UserWarning
-        For an array with two axes that looks like one image: both are of 2 to 64, or equal. `images[:, None]` says that
+        For an array with two axes that looks like one image: both sides have 2 to 64 entries. `images[:, None]` says that
         it is n images, without a warning.
     """
     return support_scores(*_pairs(images, truths))[0]
@@ -47,7 +47,7 @@ def _pairs(images, truths):
     if images.shape != truths.shape or images.ndim == 0:
         raise ValueError(f"`images` has shape {images.shape} and `truths` {truths.shape}; both have to be the same")
     count = 1 if images.ndim == 1 else len(images)
-    if images.ndim == 2 and min(images.shape) > 1 and (max(images.shape) <= _SIDE or count == images.shape[1]):
+    if images.ndim == 2 and min(images.shape) > 1 and max(images.shape) <= _SIDE:
         warnings.warn(
             f"`images` has shape {images.shape}: it is scored as {count} images of {images.shape[1]} taxels. One image "
             f"of {count} x {images.shape[1]} taxels is `image[None]`; `images[:, None]` ends this warning",

@@ -1,4 +1,4 @@
-//! MuJoCo's library, opened when a scene first needs it: programs start, and do all else, without it.
+//! MuJoCo's library, opened when a scene first needs it. Programs start without it, and only scenes ask for it.
 //!
 //! `mujoco-rs` declares MuJoCo's functions and links no library (`DOCS_RS` in `.cargo/config.toml` tells its build
 //! script so). They are defined here, and forward to the library that [`open`] has found.
@@ -14,10 +14,10 @@ use std::ffi::{CStr, c_char, c_int, c_uchar, c_void};
 use std::path::{Path, PathBuf};
 use std::sync::{Mutex, OnceLock, PoisonError};
 
-/// The one version of MuJoCo that the binding is made for: its structures are laid out anew in every other.
+/// The one version of MuJoCo that the binding is made for: every version lays its structures out differently.
 pub const MUJOCO_VERSION: &str = "3.17.0";
 
-/// Environment variable with the library's path, for a library that lies nowhere else.
+/// Environment variable with the library's path, for a library in another place.
 pub const PATH_VARIABLE: &str = "SPTS_MUJOCO";
 
 /// Name of the library's file.
@@ -43,7 +43,7 @@ macro_rules! functions {
         impl Functions {
             #[expect(unsafe_code, reason = "symbols of a C library")]
             fn of(library: &'static Library) -> Result<Self, libloading::Error> {
-                // SAFETY: the types are those of the binding of this version, as `SIGNATURES` checks
+                // SAFETY: the types are those of the binding of this version, as the constant below checks
                 Ok(Self { $($name: unsafe { *library.get(concat!(stringify!($name), "\0").as_bytes())? },)* })
             }
         }
@@ -111,7 +111,7 @@ functions! {
     fn mjr_readPixels(rgb: *mut c_uchar, depth: *mut f32, viewport: mjrRect, context: *const mjrContext);
 }
 
-/// Looks for the library in `folder`, too, and before all places but the one that [`PATH_VARIABLE`] names.
+/// Looks for the library in `folder` too: after [`PATH_VARIABLE`], before all other places.
 pub fn look_in(folder: PathBuf) {
     FOLDERS.lock().unwrap_or_else(PoisonError::into_inner).push(folder);
 }
@@ -144,12 +144,12 @@ fn functions_of(file: &Path) -> Result<Functions, Refusal> {
     };
     let library = opened(file).map_err(|error| match other_version() {
         _ if file.components().count() > 1 => refused(&format!("{} cannot be opened: {error}", file.display())),
-        Some(other) => refused(&format!("{} is another", other.display())),
+        Some(other) => refused(&format!("{} is another version", other.display())),
         None => refused("it is not found"),
     })?;
     let library: &'static Library = Box::leak(Box::new(library));
     let functions =
-        Functions::of(library).map_err(|_| refused(&format!("{} is no MuJoCo, or another", file.display())))?;
+        Functions::of(library).map_err(|_| refused(&format!("{} is no MuJoCo, or another version", file.display())))?;
     // SAFETY: it takes nothing, and answers a text that stays
     let found = unsafe { CStr::from_ptr((functions.mj_versionString)()) }.to_string_lossy();
     if found == MUJOCO_VERSION { Ok(functions) } else { Err(refused(&format!("{} is {found}", file.display()))) }
@@ -185,10 +185,10 @@ fn other_version() -> Option<PathBuf> {
 fn library_file() -> Result<PathBuf, Refusal> {
     if let Some(named) = std::env::var_os(PATH_VARIABLE).filter(|named| !named.is_empty()) {
         let named = PathBuf::from(named);
-        return if named.is_file() {
-            Ok(named)
-        } else {
-            Err(Refusal::new(format!("`{PATH_VARIABLE}` = {} is no file", named.display())))
+        // with its folder: a mere name would be looked for in the system's places
+        return match named.canonicalize() {
+            Ok(file) if file.is_file() => Ok(file),
+            _ => Err(Refusal::new(format!("`{PATH_VARIABLE}` = {} is no file", named.display()))),
         };
     }
     let program = std::env::current_exe().unwrap_or_default();

@@ -84,12 +84,14 @@ pub struct Dome {
 }
 
 impl Plan {
-    /// A simple outline without holes.
+    /// A plan with one simple, counter-clockwise outline and no holes. `least_width` as in [`Plan::apart`].
     pub fn simple(outline: Vec<Point>, least_width: f64) -> Self {
         Self { add: vec![outline], least_width, ..Self::default() }
     }
 
-    /// A simple outline with holes, or several separate outlines.
+    /// A plan with the union of the loops `add` as footprint, minus the holes `cut`. Loops must be simple and
+    /// counter-clockwise, and must not touch each other. `least_width` is the width of the narrowest bar or gap, in the
+    /// unit of the points.
     pub fn apart(add: Vec<Vec<Point>>, cut: Vec<Vec<Point>>, least_width: f64) -> Self {
         Self { add, cut, least_width, ..Self::default() }
     }

@@ -21,7 +21,7 @@ const BOUNCE_S: f64 = 0.05;
 impl Moving {
     /// Follows `choice` in press number `press`: poses are drawn until one can be pressed.
     pub(super) fn new(spec: &Spec, choice: &Choice, streams: Streams, press: u64) -> Result<Self, Refusal> {
-        // no pose can be followed without it
+        // no pose can be followed without MuJoCo
         spts_sim::engine::open()?;
         let mut attempt = 0;
         loop {

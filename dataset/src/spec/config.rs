@@ -155,7 +155,9 @@ pub enum ObjectSource {
     Frames,
 }
 
-/// Section `[pose]`. All values are draws, and they add up.
+/// Section `[pose]`: where and how the object is pressed. Each value may be a [`Draw`]. The pose is `about`, moved and
+/// turned by the other fields; along x it is moved by `x_share` times the sheet's width plus `x_m`, along y likewise
+/// with the height.
 #[derive(Debug, Clone, PartialEq, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PoseConfig {

@@ -18,11 +18,12 @@ use spts_studies::bench::{
 };
 use std::path::{Path, PathBuf};
 
-/// The benchmark of few-wire touch: fixed tasks, the same wire for all, a card for every entrant.
+/// Benchmark of touch sensing with few wires: every entrant gets the same tasks, wire and noise, and its scores are
+/// written to a file, its card.
 ///
-/// The suite touch-1 has sixteen tasks: images of shapes anywhere, classes, contacts at once, courses in time, drift,
-/// faults, up to 10,000 taxels. All touches follow from its seeds, so that nothing is downloaded. The protocol is
-/// docs/benchmark.md.
+/// Suite touch-1 has sixteen tasks: images of shapes at any place, classification, several contacts at once, contacts
+/// that change in time, drift, faulty cells, several wires, and a skin of 10,000 taxels. Nothing is downloaded: all
+/// touches are simulated from seeds of the suite. docs/benchmark.md is the protocol.
 #[derive(Debug, Args)]
 #[command(arg_required_else_help = true)]
 pub(super) struct BenchCommand {
@@ -52,7 +53,7 @@ impl BenchCommand {
     }
 }
 
-/// Tasks of the suite, and who can take part by name.
+/// Lists the tasks of the suite, and the entrants that `spts bench run` knows by name.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts bench list
@@ -170,11 +171,11 @@ impl DataCommand {
 /// What an entrant decides.
 #[derive(Debug, Clone, Copy, ValueEnum)]
 enum TrackName {
-    /// Images or classes from given rows
+    /// Decodes images or classes; the rows of weights are given
     Decoder,
-    /// Rows of ±1 too
+    /// Also chooses the rows of weights, of ±1
     Rows,
-    /// What is measured
+    /// Chooses every measurement itself, and may use the samples so far
     Readout,
 }
 
@@ -200,8 +201,8 @@ struct RunCommand {
     /// An entrant by its name (spts bench list), a Python file with a class, or a program in quotes
     #[arg(value_name = "NAME|FILE.py|PROGRAM")]
     who: String,
-    /// Track, for a name that several have, or a program [default: the first that has it; of a class in Python that of
-    /// its methods; of a program decoder]
+    /// What the entrant chooses itself. Needed for a name that is in several tracks, or for a program [default: the
+    /// first track that has the name; for a Python class, the track that its methods show; for a program, decoder]
     #[arg(long)]
     track: Option<TrackName>,
     /// Tasks [default: all]
@@ -210,7 +211,7 @@ struct RunCommand {
     /// Tasks that it cannot do, for which there are no points [default: none]
     #[arg(long, value_delimiter = ',', value_name = "TASK,…", value_parser = known_task())]
     skip: Vec<&'static Task>,
-    /// Few touches, a minute
+    /// Score on few touches; takes about a minute
     #[arg(long)]
     quick: bool,
     /// The touches for development, whose truth may be seen, in place of those for scores
@@ -284,8 +285,9 @@ fn read(file: &Path) -> Result<Card, Refusal> {
 /// Largest card, bytes.
 const MOST_BYTES: u64 = 10_000_000;
 
-/// Runs the entrant of a card again and compares. A card of a program has its command, which is run in this folder:
-/// look at it before if the card is not yours. The status is 1 if the cards differ.
+/// Runs the entrant of a card again and compares the scores with those in the card. If the card is from an external
+/// program, its `command` is run in the current folder: read `command` first if the card is not yours. The exit status
+/// is 1 if the scores differ.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts bench verify cards/amortised.json
@@ -357,7 +359,7 @@ impl VerifyCommand {
     }
 }
 
-/// Makes a leaderboard of cards.
+/// Makes a leaderboard from cards.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts bench table cards/

@@ -24,8 +24,9 @@ use std::path::{Path, PathBuf};
 /// in the images of all objects differ from those in a simulation of the same contacts on a median skin. Prints how
 /// well the gains predict objects that they were not fitted to.
 ///
-/// Two things are reported and not modelled: the even/odd pattern of the rows with nothing on the skin (`idle_parity`),
-/// where it differs from the one in contact (`parity`), and outliers that no late update explains.
+/// Two effects are reported but not included in the profile: outliers that no late update explains, and the difference
+/// between even and odd rows of weights on the untouched skin (`idle_parity`) where it is not the one in contact
+/// (`parity`).
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts calibrate recordings/ --out my_skin.toml
@@ -44,13 +45,14 @@ pub(super) struct CalibrateCommand {
     /// File of the profile [default: none, only the numbers are printed]
     #[arg(long, value_name = "FILE.toml", value_parser = parse_out)]
     out: Option<PathBuf>,
-    /// Use this session alone [default: all sessions; the profile then has spans over their values]
+    /// Fit this session alone [default: all sessions; a parameter of the profile is then a range in which a new session
+    /// is expected]
     #[arg(long, value_name = "NAME")]
     session: Option<String>,
-    /// Fit the gains of the taxels in place of the readout: each with a band, from raster presses of objects that the
-    /// simulation knows. Presses that are scored are left out, so that a score with these gains has not seen them; a
-    /// note names the sessions that have no others. `--out` then takes the gains, and pictures of them (.png, .svg)
-    /// beside
+    /// Fit the gains of the taxels, each with a band, in place of the readout. They are fitted to raster presses of
+    /// objects that the simulation knows. Presses that `spts score` scores are left out, so scores with these gains
+    /// stay independent; if a session has only scored presses, they are used and a note names the session. `--out` then
+    /// writes the gains, with figures (.png, .svg) beside the file
     #[arg(long, conflicts_with_all = ["session", "presses"])]
     skin: bool,
     /// Root of the random numbers of simulated presses (--skin)

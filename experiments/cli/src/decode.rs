@@ -23,11 +23,10 @@ use std::path::{Path, PathBuf};
 
 /// Decodes sessions: the image, class and place of what was pressed, from M samples of the one wire.
 ///
-/// SESSION is a folder with session.json, as `spts simulate` leaves one, a folder of such folders, or recordings of the
-/// real skin. Each session is decoded with its own rows of weights, whatever its layout. The decoders learn from raster
-/// presses that are not scored. Where there are none, they use a prior made for the layout: random shapes anywhere on
-/// it. Scores are given where the truth is known, as by `spts score`: the conductances of the press, else the
-/// least-squares image of its own hold without the samples of the window, else a raster scan of another press.
+/// SESSION is a folder with session.json, such as `spts simulate` writes, a folder of such folders, or recordings of
+/// the real skin. Each session is decoded with its own rows of weights, and sessions may differ in layout. The decoders
+/// are trained on raster presses that are not scored. If there are none, they use a prior for random shapes anywhere on
+/// the skin. Images are scored where a true image is known, by the rules of `spts score --help`.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts simulate press/T --out out/T && spts decode out/T
@@ -43,17 +42,17 @@ Files in DIR:
 
 --json prints {\"rows\": [{\"session\", \"block\", \"window\", \"decoder\", \"m\", \"start\", \"support\", \"iou\", \"correlation\",
 \"label\", \"label_true\", \"place\"}, ...]}, one entry a window; all numbers count from 0, and scores are null where no truth
-is known. Its `slips`, [{\"session\", \"block\", \"from\", \"rows\"}, ...], are the places from which on samples lagged behind
-their rows of weights, because the cells had missed clock edges. Such samples are put back on their rows before they are
-decoded; `start` counts rows then.")]
+is known. Its `slips`, [{\"session\", \"block\", \"from\", \"rows\"}, ...], say where cells had missed clock edges: the samples
+from number `from` on belong to rows of weights that are `rows` earlier. Such samples are assigned to their own rows
+before they are decoded, and `start` then counts rows of weights.")]
 pub(super) struct DecodeCommand {
     /// Session, folder of sessions, or recordings of the real skin
     session: PathBuf,
     /// Only the sessions of these names [default: all in SESSION]
     #[arg(long = "session", value_name = "NAME,...", value_delimiter = ',')]
     only: Vec<String>,
-    /// Decoders; see `spts score --list`. `auto` is the one for images of anything on this skin: `amortised`, but
-    /// `patches` on more than 2048 taxels, and `mixture` on fewer than six rows or columns
+    /// Decoders; `spts score --list` shows their names. `auto` stands for the decoder that needs no knowledge of the
+    /// objects: `patches` on more than 2048 taxels, `mixture` on fewer than six rows or columns, else `amortised`
     #[arg(long, value_name = "NAME,...", value_delimiter = ',', default_value = AUTO)]
     decoder: Vec<String>,
     /// Numbers of samples M that an image is decoded from; each [1, 1000000] [default: 7, 20 and 50 % of the taxels,

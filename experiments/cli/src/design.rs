@@ -59,12 +59,12 @@ struct NewDesign {
     /// Width and height of the sheet, m; each [0.001, 10]
     #[arg(long, value_name = "WxH", value_parser = area, required = true)]
     area: Option<[f64; 2]>,
-    /// Distance of neighbouring taxels, as 5mm, 0.5cm or, in metres, 0.005; [0.0001, 1] m. Area and resolution make 2
-    /// to 256 taxels a side
+    /// Distance of neighbouring taxels, as 5mm, 0.5cm or, in metres, 0.005; [0.0001, 1] m. Each side of the area,
+    /// divided by this distance, must give 2 to 256 taxels
     #[arg(long, value_name = "LENGTH", value_parser = length, required = true)]
     resolution: Option<f64>,
-    /// Time from touch to image, as 5ms, 500us or, in seconds, 0.005; [1e-6, 10] s. The measurements have to fit into
-    /// it; the decoder's time is estimated beside it
+    /// Longest time in which all measurements of an image may be taken, as 5ms, 500us or, in seconds, 0.005; [1e-6, 10]
+    /// s. The decoder's time does not count; it is estimated and printed separately
     #[arg(long, value_name = "TIME", value_parser = time, required = true)]
     latency: Option<f64>,
     /// Intersection over union that the images have to reach on average; [0.01, 0.99]

@@ -12,9 +12,9 @@ use std::path::{Path, PathBuf};
 /// Reads frames of any skin or simulator, and writes them as a session that every other command takes.
 ///
 /// A frame is what all taxels show at one time. FILE is .npy, .npz, .csv (or .tsv, .txt), .mat (version 5 to 7) or
-/// .parquet. Arrays have the shape (presses, frames, rows, cols), (frames, rows, cols), (frames, rows * cols), or rows
-/// and cols first. Texts have a frame a line with all taxels, row by row, or a line a row of taxels; a header and a
-/// column of times are found. NaN is a missing value.
+/// .parquet. An array has the shape (presses, frames, rows, cols), (frames, rows, cols) or (frames, rows * cols); rows
+/// and cols may also come first. In a text file, each line is either one frame, with the taxels row by row, or one row
+/// of taxels. A header line and a column of times are recognised. NaN is a missing value.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts import glove.npy --rows 16 --cols 16 --rate 100 --out out/glove
@@ -53,11 +53,13 @@ pub(super) struct ImportCommand {
     /// Span of a press in which the contact is steady, s [default: where the sum of the taxels stays at its largest]
     #[arg(long, value_name = "START:END", value_parser = span)]
     hold: Option<[f64; 2]>,
-    /// Frames of a press, where a file has one press after another [default: as the shape says, else one press]
+    /// Number of frames of each press, for a file that has one press after another [default: from the shape of the
+    /// array, else all frames are one press]
     #[arg(long, value_name = "N", value_parser = whole::<usize>(1..=100_000_000))]
     press_frames: Option<usize>,
-    /// Make a press of every contact in the frames, from some idle frames before its onset on; contacts whose begin is
-    /// not there, and short ones, are left out. For one long run, and for presses that do not begin at the same time
+    /// Split the frames into presses, one for each contact, all of the same length. A press starts some idle frames
+    /// before the contact. Contacts whose start was not recorded are left out, and so are those shorter than half the
+    /// median length. Use it for one long run, or for presses that do not start at the same time
     #[arg(long, conflicts_with = "press_frames")]
     cut: bool,
     /// Array of an .npz or .mat with several [default: the only one, or frames, pressure, data]

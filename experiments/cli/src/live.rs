@@ -13,12 +13,12 @@ const PORT: u16 = 7117;
 
 /// Serves a page on which you press the skin with the mouse and see its wire and two decoded images move.
 ///
-/// The page is served to this machine alone, at http://127.0.0.1:PORT/; it needs no other program and no network. With
-/// a token it may be seen from elsewhere: through another port, out of a container, from another machine.
-/// Choose an object, or drop a mesh file onto the page. Press it anywhere on the skin, as hard as you like. Two
-/// decoders show what they make of the wire, each at random or designed rows of the sensing matrix, from M = 5 to
-/// 100 measurements. Cells can be broken and the noise changed while it runs. There are up to 40 updates a second
-/// on one core.
+/// By default only this machine can open the page, at http://127.0.0.1:PORT/; no other program and no network is
+/// needed. With --token, it also opens through a forwarded port, from outside a container or on another machine.
+/// Choose an object, or drop a mesh file onto the page, and press it at any place with any force. Two decoders each
+/// show an image from the samples of the wire. For each you choose random or designed rows of the sensing matrix, and M
+/// from 5 to 100 measurements. Faults of cells and the noise can be changed at any time. One core gives up to 40
+/// updates a second.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts live                          then open the address that it prints
@@ -30,11 +30,12 @@ const PORT: u16 = 7117;
 
 --json prints {\"url\"} on one line, and then serves. Ctrl-C ends it. docs/live.md says what each control does.")]
 pub(super) struct LiveCommand {
-    /// Address to listen at. Any but 127.0.0.1 and ::1 asks browsers for a token
+    /// Address to listen on. At an address other than 127.0.0.1 and ::1, browsers need a token
     #[arg(long, value_name = "ADDRESS", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST))]
     host: IpAddr,
-    /// Let in who knows TOKEN, 16 to 128 letters, digits, - and _, under any name and port; without TOKEN a random one
-    /// is made [default: none at 127.0.0.1 and ::1, a random one at other addresses]
+    /// Require a token of browsers, and accept them under any host name and port. TOKEN has 16 to 128 letters, digits,
+    /// - and _; if it is omitted, a random token is made and printed [default: no token at 127.0.0.1 and ::1, a random
+    /// one at other addresses]
     #[arg(long, value_name = "TOKEN", num_args = 0..=1, default_missing_value = "")]
     token: Option<String>,
     /// Port of the address; 0 for any free one

@@ -34,12 +34,13 @@ use std::time::Duration;
 
 /// Scores decoders side by side on recordings of a skin.
 ///
-/// Every decoder sees the same windows of M consecutive measurements of the scored presses, and is scored against the
-/// same true image: the conductances of the press where a simulation knows them; else the non-negative least-squares
-/// image of the same press, from all samples of the hold but those of the window (if there are eight a taxel, on at
-/// most 600 taxels); else one frame of a raster scan of another press, which is how the publication scores. The ceiling
-/// is the IoU that such a truth itself reaches. If a session has fewer than 15 presses, all are scored. Of a longer
-/// session, ten presses are scored; those before them condition the skin.
+/// Every decoder gets the same windows of M consecutive measurements of the scored presses, and is scored against the
+/// same true image. For simulated presses, the true image is the conductance of the taxels. For real presses, it is the
+/// non-negative least-squares image of the same press, from all samples of the hold except those of the window; this
+/// needs eight samples for each taxel, and at most 600 taxels. Otherwise it is one frame of a raster scan of another
+/// press, as in the publication. The ceiling, an IoU, says how accurate the true image itself is. If a session has
+/// fewer than 15 presses, all are scored. Of a longer session, ten presses are scored; those before them condition the
+/// skin.
 ///
 /// The scores are: IoU of the supports (the taxels above 23 % of the maximum), with the 95 % interval over objects,
 /// their sessions and presses, and the object with the lowest; cosine and weighted Jaccard index of the images, which
@@ -77,19 +78,19 @@ use std::time::Duration;
   spts score --twin my_skin.toml --external 'mine=python3 my_decoder.py' --measurements 20,50
   spts score recordings/ --against board.json --tolerance 0.005 || echo regression
 
-An external program (--external) is run by the shell; a Python file with a class that has fit(train) and predict(phi, y)
-needs no protocol (docs/benchmark.md). It reads a header line {\"taxels\", \"rows\", \"cols\", \"left_out\",
-\"classes\": {\"1\": \"brain\", ...}, \"learn\": {\"images\": [[...], ...], \"labels\": [...]}} and then one line a window, {\"m\",
-\"phi\": [\"+-+...\", ...], \"y\", \"volts\"}, and answers each at once with a line {\"image\": [...]} or {\"label\": N} or both.
-learn has the raster images to learn from and their labels. m is the number of samples, volts the samples, and y the
-samples minus the output of the untouched skin, both in V. A program that answers only labels has no scores of images.
-An image without a label is classified by the published classifier, as the images of the other decoders are. Where
-weights are not +1 or -1, phi has an array of numbers in place of each string of signs. When its input ends, the program
-has to end with status 0.
+An external program (--external) is run by the shell. A Python file with a class that has fit(train) and predict(phi, y)
+needs no protocol (docs/benchmark.md). Any other program first reads a header line {\"taxels\", \"rows\", \"cols\",
+\"left_out\", \"classes\": {\"1\": \"brain\", ...}, \"learn\": {\"images\": [[...], ...], \"labels\": [...]}}; `learn`
+is the training data, raster images and their labels. It then reads one line for each window, {\"m\", \"phi\":
+[\"+-+...\", ...], \"y\", \"volts\"}: the number of samples, the rows of weights, the samples minus the output of the
+untouched skin, and the samples, both in V. If weights are not +1 or -1, phi has an array of numbers in place of each
+string of signs. The program answers each window at once with a line {\"image\": [...]} or {\"label\": N} or both. An
+image without a label is classified by the published classifier, as the images of the other decoders are. A program that
+answers only labels has no scores of images. When its input ends, the program has to end with status 0.
 
-Every answer needs one finite value a taxel or a label that is in `classes`; nothing else may be written to standard
-output. A program that answers otherwise, ends with another status than 0 or is late (--external-timeout) is ended, and
-nothing is scored.
+An image has one finite value for each taxel; a label is one of the numbers in `classes`. Nothing else may be written to
+standard output. If an answer is invalid or later than --external-timeout, or the exit status is not 0, the program is
+stopped and nothing is scored.
 
 Files in DIR:
   board.json                 everything (--save writes the same); board.csv, objects.csv, localisation.csv
@@ -185,10 +186,11 @@ pub(super) struct ScoreCommand {
     /// three such windows, each from every third measurement. Chosen rows lose the order in time and have no votes
     #[arg(long, value_name = "KIND,...", value_delimiter = ',', default_value = "random", value_parser = sensing())]
     sensing: Vec<Sensing>,
-    /// Choose rows that see the worst kind of what was learned from as well as can be, in place of the mean of all; for
-    /// `--sensing chosen`. Kinds are the families of `shapes`, the objects of any other source, and the widths of blobs
-    /// for places. Rows for classes are chosen as without, for the classes that are least apart. The tables call such
-    /// rows `worst_kind`
+    /// Choose rows that keep the largest expected error of any kind of image small, in place of the mean expected error
+    /// of all images; only for `--sensing chosen`. A kind is a family of shapes with `--learn-from shapes`, an object
+    /// with any other source, and a width of the blobs for places. Rows for classification are the same with and
+    /// without this option: they separate the classes that are hardest to tell apart. The tables call rows for images
+    /// `worst_kind`
     #[arg(long)]
     worst_kind: bool,
     /// Leave the times of decoding out, so that the output is the same from run to run

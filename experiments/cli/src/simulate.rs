@@ -118,14 +118,14 @@ pub(super) struct SimulateCommand {
     /// Resolution of the contact: grid squares along one side of a taxel; [1, 64] [default: 6, or the scene file's]
     #[arg(long, value_name = "N", value_parser = whole::<u32>(1..=64))]
     cells: Option<u32>,
-    /// The error that the scene may have against the finest contact: E, the relative error of the taxels' pressures,
-    /// [0.03, 1]; or iou=E or class=E, the change of that score, [0.005, 0.5]. The twin takes the cheapest contact
-    /// model and grid that keep to it on this scene's contact, and the longest stable step [default: none; --contact,
-    /// --cells and --timestep choose them]
+    /// Largest error against the finest contact model and grid: E is the relative error of the taxels' pressures,
+    /// [0.03, 1]; iou=E or class=E is the change of that score, [0.005, 0.5]. The twin then chooses the cheapest
+    /// contact model and grid with at most this error for this scene, and the longest stable step [default: none;
+    /// --contact, --cells and --timestep choose them]
     #[arg(long, value_name = "E", conflicts_with_all = ["contact", "cells", "timestep"])]
     tolerance: Option<Tolerance>,
-    /// Runs the full chain beside the one that a tolerance chose, on the first two presses or drops of this scene, and
-    /// prints the differences
+    /// Also simulate the first two presses or drops with the finest contact model and grid, and print how far the
+    /// results with --tolerance differ
     #[arg(long)]
     check: bool,
     /// Root of every random number; [0, 2^63) [default: 0, or the scene file's]

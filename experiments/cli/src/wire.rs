@@ -19,11 +19,11 @@ use spts_studies::frames::{FramesReport, frames_report};
 use std::borrow::Cow;
 use std::path::{Path, PathBuf};
 
-/// Records frames of any skin as a skin with one wire would, and says what one wire and a few would show of them.
+/// Simulates how a skin with one or a few wires would record given frames, and scores the images decoded from them.
 ///
-/// SESSION is a folder that `spts import` has written, or a folder of such folders; sessions of `spts simulate` will
-/// do. DIR becomes a session with both recordings, by the wire and by a scan, which `spts decode`, `spts score` and
-/// `spts calibrate` read. Of several sessions, every one has its folder in DIR.
+/// SESSION is a folder that `spts import` or `spts simulate` has written, or a folder of such folders. The results in
+/// DIR are a session with two recordings, one by a single wire and one by a scan of all taxels; `spts decode`, `spts
+/// score` and `spts calibrate` read it. For several sessions, DIR has a folder for each.
 #[derive(Debug, Args)]
 #[command(after_help = "Examples:
   spts import glove.npy --rows 16 --cols 16 --rate 100 --out out/glove
@@ -38,10 +38,12 @@ Files in DIR:
   tables/wire.csv              a line for each number of wires, kind of rows and number of measurements
   tables/frames.csv laws.csv   how presses repeat and drift, object by object; how far the transducer's laws hold
 
-Idle frames are subtracted. Pressures go through the simulated foam's transducer; conductances are taken as they are; of
-codes and relative values the largest is taken for what --peak gives. Skins of more than 2048 taxels have no page.
-Of three objects or more that are pressed twice, every other touch teaches two decoders, which are asked for the rest:
-one learns from the other objects alone (IoU, left out), and one recognises objects (recognised).
+Before anything else, the mean of each press's idle frames is subtracted. Pressures then go through the simulated foam's
+transducer. Conductances are used unchanged. Codes and relative values are scaled to conductances; --peak sets the
+scale. Skins of more than 2048 taxels get no page.
+If there are at least three objects, each pressed at least twice, two more decoders are trained on every other press of
+each object and scored on the remaining presses. The first is trained without the object that it is scored on (IoU, left
+out). The second is trained on all objects and names the object (recognised).
 --json prints {\"decoder\", \"scan_s\", \"scan_iou\", \"scan_classes\", \"again_iou\", \"touches\", \"objects\", \"left_out\",
 \"rows\": [{\"wires\", \"rows\", \"m_per_wire\", \"m\", \"time_s\", \"iou\", \"worst_iou\", \"worst\", \"left_out_iou\", \"classes\",
 \"saturated\", \"used\", \"signal_to_noise\"}], \"frames\": {\"objects\", \"laws\"}}.")]
@@ -63,15 +65,17 @@ pub(super) struct WireCommand {
     /// taxels]
     #[arg(long, value_name = "M,...", value_delimiter = ',', value_parser = parse_measurements)]
     measurements: Vec<usize>,
-    /// Numbers of wires, each of which reads a band of whole rows of taxels; each [1, 1024] [default: 1,2,4, those that
-    /// there are rows for]
+    /// Numbers of wires to compare. Each wire reads a band of whole rows of taxels, so there can be no more wires than
+    /// rows; each [1, 1024] [default: 1, 2 and 4, up to the number of rows]
     #[arg(long, value_name = "N,...", value_delimiter = ',', value_parser = whole::<usize>(1..=1024))]
     wires: Vec<usize>,
-    /// Pressure that the largest value of codes and relative frames, of all sessions, is taken for, Pa; [100, 1000000]
+    /// For frames in codes or relative values: pressure that sets their scale, Pa; [100, 1000000]. The largest value of
+    /// all sessions becomes the conductance that a median taxel of the simulated skin has under this pressure; the
+    /// other values are scaled in proportion
     #[arg(long, value_name = "PA", value_parser = within(100.0, 1e6, "[100, 1000000]"), default_value_t = 30e3)]
     peak: f64,
-    /// Presses of every session that are recorded, from the first; how they repeat and drift is told of all [default:
-    /// all]
+    /// Number of presses to record from each session, starting with the first. The tables of repeatability and drift
+    /// still use every press [default: all]
     #[arg(long, value_name = "N", value_parser = whole::<usize>(1..=100_000))]
     presses: Option<usize>,
     /// Root of every random number

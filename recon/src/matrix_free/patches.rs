@@ -49,9 +49,11 @@ const MOST_TAXELS: usize = 2048;
 /// Sweeps of the coordinate descent.
 const SWEEPS: usize = 100;
 
-/// Finds contacts of any size on a large skin: as [`Patches`], or as an image of small total variation ([`Tv`]) on
-/// square cells of several taxels. One measurement in nine is kept back; what predicts them better is used, and cells
-/// are not looked at where patches predict half of them. An offset that all measurements share is left out.
+/// Finds contacts of any size on a large skin, by one of two methods: as small patches ([`Patches`]), or as an image of
+/// small total variation ([`Tv`]) on a coarse grid, whose square cells cover several taxels each. The last ninth of the
+/// measurements is kept back for the choice: the method with the smaller residual on them decodes all measurements. The
+/// coarse grid is not tried if the residual of the patches is below half of the norm of these measurements, or if there
+/// are fewer than 18 measurements. An offset that all measurements of a wire share is removed.
 ///
 /// ```
 /// use spts_recon::Matrix;
@@ -89,10 +91,12 @@ const VARIATION: Penalty = Penalty::Relative(0.02);
 const STOPPING: Stopping = Stopping { tol: 1e-4, max_iter: 20_000 };
 
 impl OnSheet {
-    /// Cells that are usual: more take long, and show no more where patches fail.
+    /// Usual limit on the number of cells. More cells take longer, and do not improve images of contacts that patches
+    /// fail on.
     pub const CELLS: usize = 2500;
 
-    /// Images of `rows` × `cols` taxels, with cells of so many taxels that there are at most `cells` of them.
+    /// A decoder for images of `rows` × `cols` taxels. Its coarse grid has at most `cells` square cells, and at most
+    /// four cells for each measurement; the side of a cell is the smallest whole number of taxels that allows this.
     pub fn new(rows: usize, cols: usize, cells: usize) -> Self {
         Self { patches: Patches::new(rows, cols), cells }
     }

@@ -98,7 +98,7 @@ impl MechanicsConfig {
             level.apply(&mut config.contact, cells);
             level.coupled.is_none() || Mechanics::build(config, folder, given.cloned()).is_ok()
         };
-        // courses need the engine, and a choice without them would be another one
+        // courses need MuJoCo; without them the choice would differ
         crate::engine::open()?;
         let courses = |courses: Courses| {
             let at = |level: &str, cells: usize| {

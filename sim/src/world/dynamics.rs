@@ -107,7 +107,7 @@ impl Dynamics {
         self.step as f64 * self.scene.timestep_s()
     }
 
-    /// Bounces of the ball so far; empty for a press.
+    /// Bounces that the ball has finished so far, in order of time; empty for a press.
     pub(super) fn bounces(&self) -> &[Bounce] {
         match &self.driver {
             Driver::Press(_) => &[],

@@ -104,7 +104,7 @@ impl World {
         }
     }
 
-    /// Bounces of the ball so far; empty for a press.
+    /// Bounces that the ball has finished so far, in order of time; empty for a press.
     pub fn bounces(&self) -> &[Bounce] {
         match &self.engine {
             Engine::Dynamics(dynamics) => dynamics.bounces(),

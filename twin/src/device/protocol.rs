@@ -113,7 +113,8 @@ impl<P: Read + Write> VirtualDevice<P> {
     }
 }
 
-/// Sends all codes of `block` but the last, as the real device does.
+/// Writes `block` as the device sends it, and flushes: `frame_position`, then all codes but the last, each followed by
+/// a comma; then a space and `\r\n`. The real device also omits the last code.
 ///
 /// # Errors
 /// The error of the port.

@@ -476,7 +476,8 @@ impl Dictionary {
         }
     }
 
-    /// Turns rows of Φ·D with weights ±1 into rows with weights {0, 1}.
+    /// Converts rows of Φ·D in place, from weights ±1 to weights {0, 1}: −1 becomes 0. `rows` is row-major, one value
+    /// for each atom.
     pub fn to_unit_weights(&self, rows: &mut [f64]) {
         for row in rows.chunks_exact_mut(self.sums.len().max(1)) {
             row.iter_mut().zip(&self.sums).for_each(|(a, s)| *a = 0.5 * (*a + s));
