@@ -33,9 +33,9 @@ pub(super) struct LiveCommand {
     /// Address to listen on. At an address other than 127.0.0.1 and ::1, browsers need a token
     #[arg(long, value_name = "ADDRESS", default_value_t = IpAddr::V4(Ipv4Addr::LOCALHOST))]
     host: IpAddr,
-    /// Require a token of browsers, and accept them under any host name and port. TOKEN has 16 to 128 letters, digits,
-    /// - and _; if it is omitted, a random token is made and printed [default: no token at 127.0.0.1 and ::1, a random
-    /// one at other addresses]
+    /// Require a token of browsers, and accept them under any host name and port. TOKEN has 16 to 128 characters:
+    /// letters, digits, - and _. If it is omitted, a random token is made and printed [default: no token at 127.0.0.1
+    /// and ::1, a random one at other addresses]
     #[arg(long, value_name = "TOKEN", num_args = 0..=1, default_missing_value = "")]
     token: Option<String>,
     /// Port of the address; 0 for any free one
