@@ -31,8 +31,8 @@ def support_accuracy(images, truths):
     Warns
     -----
     UserWarning
-        For an array with two axes that looks like one image: both sides have 2 to 64 entries. `images[:, None]` says that
-        it is n images, without a warning.
+        For an array with two axes that looks like one image: both sides have 2 to 64 entries. `images[:, None]` are n
+        images, without a warning.
     """
     return support_scores(*_pairs(images, truths))[0]
 

@@ -624,8 +624,8 @@ def dress(
         links = list(placed)
     if not links:
         raise ValueError(
-            "`links` is empty: the model has no moving body with a geom that collides, or loose objects alone, "
-            "which have to be named"
+            "`links` is empty: no moving body but loose objects has a geom that collides. "
+            "A loose object wears skin if it is named"
         )
     if data.time == 0.0 and not data.xmat.any():
         mujoco.mj_kinematics(model, data)

@@ -70,11 +70,11 @@ def score(
     ----------
     estimator : str, estimator, or a list or dict of them
         A decoder's name, or whatever has `predict(X)` with X as `spts.windows` makes it: images (n, taxels), or
-        classes. An estimator that is fitted already is scored as it is. Another one of scikit-learn is cloned and
+        classes. An estimator that is fitted already is scored as it is. An unfitted one of scikit-learn is cloned and
         learns, for every M, from windows that are computed of raster images: `fit(X, images)`, or `fit(X, names)` of a
         classifier. An entrant of `spts bench` will do, too: `predict(phi, y)` with phi (M, taxels) and y (M,), which
         answers an image or (image, name). It is copied and learns with `fit(train)`, if it has `fit`; its `rows` and
-        `read` are not asked.
+        `read` are not called.
     data : str, os.PathLike, Session, sequence of Session, or Dataset
         Sessions, or the folder of them as `spts.load_all` takes it, or a data set.
     measurements : sequence of int

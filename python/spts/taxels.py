@@ -91,8 +91,9 @@ class Table:
 
 
 def tables(taxels, unit):
-    """The `Table` of every source, with the link that the caller has named for it, or None. `taxels` is a path, several,
-    an array, or a dict of those by links."""
+    """The `Table` of every source, with the link that the caller has named for it, or None.
+
+    `taxels` is a path, several, an array, or a dict of those by links."""
     if unit not in UNITS:
         raise ValueError(f"`unit` = {unit!r}; valid: {', '.join(UNITS)}")
     given = taxels.items() if isinstance(taxels, dict) else [(None, taxels)]
