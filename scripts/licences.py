@@ -1,8 +1,8 @@
 #!/usr/bin/env python3
 """Prints what the program and the wheel are made of, as CSV: crate, version, licence, and where its source is.
 
-`python3 scripts/licences.py TARGET...`, a target as x86_64-unknown-linux-gnu. What only tests and build scripts use is
-left out.
+`python3 scripts/licences.py TARGET...`, a target as x86_64-unknown-linux-gnu. What only tests, build scripts and
+macros use is left out.
 """
 
 import csv
@@ -12,7 +12,12 @@ import sys
 
 
 # what is no crate and is in them all the same
-FONT = ("Inter (font)", "4", "OFL-1.1", "https://github.com/rsms/inter")
+FONT = ("Inter (font)", "3.19", "OFL-1.1", "https://github.com/rsms/inter")
+
+
+def macro(package):
+    """Whether `package` only writes code while others are compiled."""
+    return any("proc-macro" in target["kind"] for target in package["targets"])
 
 
 def crates(manifest, root, target):
@@ -28,7 +33,7 @@ def crates(manifest, root, target):
         if key not in linked:
             linked.add(key)
             kinds = [(dep["pkg"], kind["kind"]) for dep in nodes[key]["deps"] for kind in dep["dep_kinds"]]
-            todo += [dependency for dependency, kind in kinds if kind is None]
+            todo += [dependency for dependency, kind in kinds if kind is None and not macro(packages[dependency])]
     return {(packages[key]["name"], packages[key]["version"]): packages[key] for key in linked}
 
 

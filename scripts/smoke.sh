@@ -7,7 +7,8 @@ set -euo pipefail
 cd "$(dirname "$0")/.."
 folder=$(realpath "$1")
 work=$(mktemp -d)
-trap 'rm -rf "$work"' EXIT
+# not into what a debootstrap that was stopped has mounted there
+trap 'rm -rf --one-file-system "$work"' EXIT
 root=$work/x86_64
 # system FOLDER ARGUMENT...: Debian's smallest system with a Python
 system() {

@@ -151,3 +151,21 @@ fn every_path_of_the_architecture_exists() {
     }
     assert!(seen > 40, "{seen} paths");
 }
+
+/// What a release changes by hand is changed everywhere (CONTRIBUTING.md).
+#[test]
+fn the_version_is_everywhere_the_same() {
+    let version = env!("CARGO_PKG_VERSION");
+    for (file, line) in [
+        ("python/Cargo.toml", format!("version = \"{version}\"")),
+        ("fuzz/Cargo.toml", format!("version = \"{version}\"")),
+        ("python/spts/__init__.py", format!("__version__ = \"{version}\"")),
+        ("CITATION.cff", format!("version: {version}")),
+    ] {
+        let text = fs::read_to_string(root().join(file)).unwrap();
+        assert!(text.lines().any(|found| found == line), "{file} has no line {line}");
+    }
+    let text = fs::read_to_string(root().join("CHANGELOG.md")).unwrap();
+    let newest = text.lines().find_map(|line| line.strip_prefix("## ").filter(|heading| *heading != "Unreleased"));
+    assert!(newest.is_some_and(|heading| heading.starts_with(&format!("{version} – "))), "CHANGELOG.md: {newest:?}");
+}

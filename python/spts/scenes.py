@@ -13,7 +13,10 @@ from .sessions import load
 __all__ = ["simulate"]
 
 # the library of PyPI's mujoco, which need not be imported for it
-_mujoco = importlib.util.find_spec("mujoco")
+try:
+    _mujoco = importlib.util.find_spec("mujoco")
+except ValueError:  # a module that stands in for it
+    _mujoco = None
 for _folder in (_mujoco and _mujoco.submodule_search_locations) or []:
     _spts.look_in(_folder)
 

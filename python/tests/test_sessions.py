@@ -182,7 +182,7 @@ def test_scores_on_sessions(sessions):
 
 
 class Entrant:
-    """A class as `spts bench` runs it: the ridge of docs/benchmark.md."""
+    """A class as `spts bench` runs it: the ridge of docs/my_decoder.md."""
 
     def fit(self, train):
         assert train.images.shape == (len(train.labels), train.rows * train.cols) and train.measurements == [20]

@@ -6,7 +6,7 @@ use crate::place::{PlaceRow, locator_label};
 use crate::sensing::Sensing;
 use crate::table::{Cell, Table, TextTable, fixed};
 use crate::tally::Scores;
-use crate::training::{PUBLISHED, RASTER};
+use crate::training::{LAYOUT, PUBLISHED, RASTER};
 use crate::truth::TruthKind;
 use crate::unique;
 use spts::output::{OutputFolder, write_json};
@@ -121,6 +121,9 @@ pub fn table(board: &ScoreBoard) -> String {
         }
     }
     out.push_str(&truths(board));
+    if board.rows.iter().any(|r| r.key.learned_from == LAYOUT) {
+        out.push_str("layout: no raster press was left to learn from, so that images of random shapes on the layout were learned; record several presses a session\n");
+    }
     if board.rows.iter().any(|r| r.look_up) {
         out.push_str("look-up: the answer is an image of a learned class, the scored object among them; it says nothing of other objects\n");
     }
