@@ -91,7 +91,7 @@ browser: setup
 	./scripts/setup.sh chromium
 	./scripts/environment.sh "$(BROWSER)" scripts/browser/requirements.txt
 	cargo build --release --locked --quiet --workspace
-	"$(BROWSER)/bin/python" -m pytest --quiet --tb=short -rs -p no:cacheprovider scripts/browser $(if $(SHOTS),--shots "$(SHOTS)")
+	"$(BROWSER)/bin/python" -m pytest $(PARALLEL) --quiet --tb=short -rs -p no:cacheprovider scripts/browser $(if $(SHOTS),--shots "$(SHOTS)")
 
 # Speed, beside the named peers.
 bench: setup
