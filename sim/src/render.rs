@@ -1,9 +1,8 @@
-//! Pictures of a simulation, drawn off-screen by MuJoCo through EGL.
+//! Pictures of a simulation, drawn off-screen by MuJoCo through EGL, which Linux alone has.
 
 use crate::world::World;
 use crate::world::model::{BODY_GEOM, MAX_PADS, PAD_RGB, Visuals, compile, pad_name};
 use mujoco_rs::prelude::{MjData, MjModel, MjtObjBase, MjvCamera};
-use mujoco_rs::renderer::MjRenderer;
 use spts_contact::Frame;
 use spts_input::Refusal;
 
@@ -76,13 +75,8 @@ impl Renderer {
     /// `full_scale_pa`, and a close-up shows them through the body.
     ///
     /// # Errors
-    /// [`Refusal`] if EGL is missing.
+    /// [`Refusal`] if EGL is missing, as on every system but Linux.
     pub fn draw(&mut self, world: &World, camera: Camera, frame: Option<(&Frame, f64)>) -> Result<Picture, Refusal> {
-        let failed = |error: mujoco_rs::renderer::RendererError| {
-            Refusal::new(format!(
-                "off-screen rendering failed: {error} (is EGL installed? Debian: libegl1 libegl-mesa0 libgl1-mesa-dri)"
-            ))
-        };
         for (taxel, &geom) in self.pads.iter().enumerate() {
             let level = frame.map_or(0.0, |(f, full_pa)| f.pressure.values()[taxel] / full_pa);
             let [r, g, b] = heat(level);
@@ -95,15 +89,39 @@ impl Renderer {
         let mut data = MjData::new(&*self.model);
         data.qpos_mut().copy_from_slice(&world.positions());
         data.forward();
-        let mut renderer = MjRenderer::new(&self.model, self.width, self.height, 0).map_err(failed)?;
-        if let Some(id) = self.model.name_to_id(MjtObjBase::mjOBJ_CAMERA, camera.name()) {
-            renderer.set_camera(MjvCamera::new_fixed(id));
-        }
-        renderer.sync_data(&mut data).map_err(failed)?;
-        renderer.render().map_err(failed)?;
-        let rgb = renderer.rgb_flat().unwrap_or_default().to_vec();
+        let camera = self.model.name_to_id(MjtObjBase::mjOBJ_CAMERA, camera.name()).map(MjvCamera::new_fixed);
+        let rgb = pixels(&self.model, &mut data, camera, [self.width, self.height])?;
         Ok(Picture { width: self.width, height: self.height, rgb })
     }
+}
+
+/// The pixels of `data`, seen by `camera`.
+#[cfg(target_os = "linux")]
+fn pixels(
+    model: &MjModel,
+    data: &mut MjData<&MjModel>,
+    camera: Option<MjvCamera>,
+    [width, height]: [usize; 2],
+) -> Result<Vec<u8>, Refusal> {
+    use mujoco_rs::renderer::{MjRenderer, RendererError};
+    let failed = |error: RendererError| {
+        Refusal::new(format!(
+            "off-screen rendering failed: {error} (is EGL installed? Debian: libegl1 libegl-mesa0 libgl1-mesa-dri)"
+        ))
+    };
+    let mut renderer = MjRenderer::new(model, width, height, 0).map_err(failed)?;
+    if let Some(camera) = camera {
+        renderer.set_camera(camera);
+    }
+    renderer.sync_data(data).map_err(failed)?;
+    renderer.render().map_err(failed)?;
+    Ok(renderer.rgb_flat().unwrap_or_default().to_vec())
+}
+
+/// Refuses: `mujoco-rs` would open a window elsewhere.
+#[cfg(not(target_os = "linux"))]
+fn pixels(_: &MjModel, _: &mut MjData<&MjModel>, _: Option<MjvCamera>, _: [usize; 2]) -> Result<Vec<u8>, Refusal> {
+    Err(Refusal::new("off-screen rendering failed: pictures of scenes are drawn on Linux alone"))
 }
 
 /// Colour of a pad at `level` (0 idle, 1 full scale): grey through violet and orange to yellow.

@@ -134,7 +134,7 @@ pub(super) fn exchange(a: &Path, b: &Path) -> io::Result<bool> {
     use rustix::fs::{CWD, RenameFlags, renameat_with};
     use rustix::io::Errno;
     let step = || Ok(renameat_with(CWD, a, CWD, b, RenameFlags::EXCHANGE)?);
-    let unknown = [Errno::INVAL, Errno::NOSYS, Errno::OPNOTSUPP].map(|error| Some(error.raw_os_error()));
+    let unknown = [Errno::INVAL, Errno::NOSYS, Errno::OPNOTSUPP, Errno::NOTSUP].map(|error| Some(error.raw_os_error()));
     match watched(DiskOperation::Exchange, b, step) {
         Err(error) if unknown.contains(&error.raw_os_error()) => Ok(false),
         other => other.map(|()| true),

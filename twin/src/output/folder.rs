@@ -135,14 +135,25 @@ impl Drop for OutputFolder {
 
 /// Whether `folder` is in use: something is mounted on it, or the program works in it.
 fn is_unmovable(folder: &Path) -> bool {
-    use rustix::fs::{AtFlags, CWD, StatxAttributes, StatxFlags, statx};
     let device = |path: &Path| path.metadata().ok().map(|found| found.dev());
-    let found = statx(CWD, folder, AtFlags::empty(), StatxFlags::empty());
     // not every system tells of a mount; another device does
-    let mounted = found.is_ok_and(|found| found.stx_attributes.contains(StatxAttributes::MOUNT_ROOT))
-        || device(folder).is_some_and(|of| folder.parent().and_then(device) != Some(of));
+    let mounted =
+        is_mount_root(folder) || device(folder).is_some_and(|of| folder.parent().and_then(device) != Some(of));
     let here = std::env::current_dir().and_then(|here| here.canonicalize());
     mounted || here.is_ok_and(|here| here.starts_with(folder))
+}
+
+/// Whether the system says that something is mounted on `folder`.
+#[cfg(target_os = "linux")]
+fn is_mount_root(folder: &Path) -> bool {
+    use rustix::fs::{AtFlags, CWD, StatxAttributes, StatxFlags, statx};
+    let found = statx(CWD, folder, AtFlags::empty(), StatxFlags::empty());
+    found.is_ok_and(|found| found.stx_attributes.contains(StatxAttributes::MOUNT_ROOT))
+}
+
+#[cfg(not(target_os = "linux"))]
+fn is_mount_root(_: &Path) -> bool {
+    false
 }
 
 /// Hidden name beside `folder`. Nothing but this program gives such names.
