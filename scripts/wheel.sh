@@ -2,7 +2,8 @@
 # Builds wheels of the Python package: wheel.sh TOOLS FOLDER [TARGET...]. TOOLS is a virtual environment. Without a
 # TARGET, it has python/build-requirements.txt, and the wheel is for this machine, of what the workspace has built. With
 # targets, it has python/release-requirements.txt: for Linux (x86_64-unknown-linux-gnu, aarch64-unknown-linux-gnu) zig
-# links the wheels for glibc 2.17, and auditwheel says that they ask for no more.
+# links the wheels for glibc 2.17, and auditwheel says that they ask for no more. Wheels for macOS (aarch64-apple-darwin,
+# x86_64-apple-darwin) are linked by the compiler of a Mac; nobody has run this part yet.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 tools=$(realpath "$1")
@@ -18,13 +19,28 @@ if [ $# = 0 ]; then
   exit
 fi
 for target in "$@"; do
-  rm -f "$folder"/spts_twin-*"${target%%-*}".whl
+  case $target in
+  *-linux-*)
+    wheel=linux*${target%%-*}
+    how=(--zig --compatibility manylinux2014)
+    ;;
+  *-apple-darwin)
+    wheel=${target%%-*}
+    wheel=macosx*${wheel/aarch64/arm64}
+    how=()
+    ;;
+  *)
+    echo "wheel: no wheels are made for $target" >&2
+    exit 2
+    ;;
+  esac
+  rm -f "$folder"/spts_twin-*$wheel.whl
   # a compiler of its own for each target
   (
     . scripts/cross.sh "$target"
-    "${build[@]}" --profile dist --target "$target" --target-dir target/dist --zig --compatibility manylinux2014
+    "${build[@]}" --profile dist --target "$target" --target-dir target/dist ${how[@]+"${how[@]}"}
   )
-  auditwheel show "$folder"/spts_twin-*"${target%%-*}".whl | tr '\n' ' ' | grep -q 'tag: *"manylinux_2_17_' || {
+  [[ $target != *-linux-* ]] || auditwheel show "$folder"/spts_twin-*$wheel.whl | tr '\n' ' ' | grep -q 'tag: *"manylinux_2_17_' || {
     echo "wheel: the wheel for $target asks for more than manylinux2014 has" >&2
     exit 1
   }
