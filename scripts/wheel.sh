@@ -19,29 +19,26 @@ if [ $# = 0 ]; then
   exit
 fi
 for target in "$@"; do
+  machine=${target%%-*}
   case $target in
-  *-linux-*)
-    wheel=linux*${target%%-*}
-    how=(--zig --compatibility manylinux2014)
-    ;;
-  *-apple-darwin)
-    wheel=${target%%-*}
-    wheel=macosx*${wheel/aarch64/arm64}
-    how=()
-    ;;
-  *)
-    echo "wheel: no wheels are made for $target" >&2
-    exit 2
-    ;;
+    *-linux-*) system=linux how=(--zig --compatibility manylinux2014) ;;
+    *-apple-darwin) system=macosx machine=${machine/aarch64/arm64} how=() ;;
+    *)
+      echo "wheel: no wheels are made for $target" >&2
+      exit 2
+      ;;
   esac
-  rm -f "$folder"/spts_twin-*$wheel.whl
+  rm -f "$folder"/spts_twin-*"$system"*"$machine".whl
   # a compiler of its own for each target
   (
     . scripts/cross.sh "$target"
+    # an empty list is an error to the bash of macOS
     "${build[@]}" --profile dist --target "$target" --target-dir target/dist ${how[@]+"${how[@]}"}
   )
-  [[ $target != *-linux-* ]] || auditwheel show "$folder"/spts_twin-*$wheel.whl | tr '\n' ' ' | grep -q 'tag: *"manylinux_2_17_' || {
-    echo "wheel: the wheel for $target asks for more than manylinux2014 has" >&2
-    exit 1
-  }
+  if [ "$system" = linux ]; then
+    auditwheel show "$folder"/spts_twin-*"$system"*"$machine".whl | tr '\n' ' ' | grep -q 'tag: *"manylinux_2_17_' || {
+      echo "wheel: the wheel for $target asks for more than manylinux2014 has" >&2
+      exit 1
+    }
+  fi
 done
