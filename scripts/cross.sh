@@ -1,5 +1,5 @@
-# Sourced with a TARGET: sees to a compiler that has its standard library. rustup's when it has it or can fetch it; else,
-# for Linux, Debian's, whose package libstd-rust-web-dev has one for each of its architectures.
+# Sourced with a TARGET: sees to a compiler that has its standard library. rustup's when it has it or can fetch it;
+# else, for Linux, Debian's, whose package libstd-rust-web-dev has one for each of its architectures.
 if ! [ -d "$(rustc --print sysroot)/lib/rustlib/$1/lib" ] && ! rustup target add "$1" >/dev/null 2>&1; then
   if [ -d "/usr/lib/rustlib/$1/lib" ]; then
     export RUSTC=/usr/bin/rustc

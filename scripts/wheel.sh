@@ -2,8 +2,8 @@
 # Builds wheels of the Python package: wheel.sh TOOLS FOLDER [TARGET...]. TOOLS is a virtual environment. Without a
 # TARGET, it has python/build-requirements.txt, and the wheel is for this machine, of what the workspace has built. With
 # targets, it has python/release-requirements.txt: for Linux (x86_64-unknown-linux-gnu, aarch64-unknown-linux-gnu) zig
-# links the wheels for glibc 2.17, and auditwheel says that they ask for no more. Wheels for macOS (aarch64-apple-darwin,
-# x86_64-apple-darwin) are linked by the compiler of a Mac; nobody has run this part yet.
+# links the wheels for glibc 2.17, and auditwheel says that they ask for no more. Wheels for macOS
+# (aarch64-apple-darwin, x86_64-apple-darwin) are linked by the compiler of a Mac; nobody has run this part yet.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 tools=$(realpath "$1")
