@@ -1437,7 +1437,7 @@ def _number(model, kind, field, name):
         number = mujoco.mj_name2id(model, kind, name)
         if number < 0:
             every = (mujoco.mj_id2name(model, kind, k) for k in range(_count(model, kind)))
-            known = ", ".join(sorted(n for n in every if n))
+            known = ", ".join(sorted(n for n in every if n)) or "none with a name"
             raise ValueError(f'`{field}`: the model has none called "{name}"; it has: {known}')
         return number
     number, count = int(name), _count(model, kind)

@@ -485,7 +485,8 @@ impl Skin {
             pressure: OnceLock::new(),
             wrenches: OnceLock::new(),
             loads: Arc::new((bodies.clone(), wrenches)),
-            area,
+            // an empty sum is -0
+            area: area + 0.0,
             time,
             number,
             bottomed,

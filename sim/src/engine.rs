@@ -21,13 +21,7 @@ pub const MUJOCO_VERSION: &str = "3.17.0";
 pub const PATH_VARIABLE: &str = "SPTS_MUJOCO";
 
 /// Name of the library's file.
-const FILE: &str = if cfg!(target_os = "macos") {
-    "libmujoco.3.17.0.dylib"
-} else if cfg!(windows) {
-    "mujoco.dll"
-} else {
-    "libmujoco.so.3.17.0"
-};
+const FILE: &str = if cfg!(target_os = "macos") { "libmujoco.3.17.0.dylib" } else { "libmujoco.so.3.17.0" };
 
 /// Where a checkout keeps the library (`scripts/setup.sh`).
 const IN_CHECKOUT: &str = "third_party/mujoco/lib";

@@ -201,14 +201,14 @@ impl Frames {
     /// A press for every contact in the frames: from some idle frames before its onset on, all equally long. The sums
     /// of the taxels in a run of frames have two levels, without and with a touch. A contact begins where the sum
     /// leaves the lower one by more than 15 % of the difference and reaches half of it, and ends below a quarter. Left
-    /// out are contacts whose begin is not in the frames, those shorter than half the usual one, and runs in which the
-    /// levels differ by less than a quarter of what they do at most.
+    /// out are touches that do not reach half of it, contacts whose begin is not in the frames, those shorter than half
+    /// the usual one, and runs in which the levels differ by less than a quarter of what they do at most.
     ///
     /// # Errors
     /// [`Refusal`] if there is no whole contact.
     pub fn cut(self) -> Result<Self, Refusal> {
         let mut contacts: Vec<Contact> = Vec::new();
-        let mut without_begin = 0;
+        let (mut without_begin, mut light) = (0, 0);
         let sums = self.sums();
         let rises: Vec<f64> = sums.iter().map(|sums| levels(sums)).map(|[low, high]| high - low).collect();
         let most = rises.iter().copied().fold(0.0, f64::max);
@@ -216,10 +216,16 @@ impl Frames {
         for (run, sums) in sums.iter().enumerate().filter(|(run, _)| rises[*run] > LEAST_RISE * most) {
             let [low, high] = levels(sums);
             let above = |share: f64| move |k: &usize| sums[*k] > low + share * (high - low);
+            let is_touched = |sum: f64| sum > low + LEFT * (high - low);
+            let is_light = |from: usize, to: usize| {
+                let runs = sums.get(from..to).unwrap_or_default().chunk_by(|a, b| is_touched(*a) == is_touched(*b));
+                runs.filter(|run| run.len() >= FEWEST_HELD && is_touched(run[0])).count()
+            };
             let mut at = 0;
             while let Some(reached) = (at..sums.len()).find(above(REACHED)) {
                 let rising = (at..reached).rev().take_while(above(TOUCHED)).count();
                 let start = reached - rising;
+                light += is_light(at, start);
                 let idle = (at..start).rev().take_while(|k| !above(TOUCHED)(k)).count();
                 let held = rising + (reached..sums.len()).take_while(above(LEFT)).count();
                 if idle == 0 {
@@ -229,6 +235,7 @@ impl Frames {
                 }
                 at = start + held;
             }
+            light += is_light(at, sums.len());
         }
         let mut lengths: Vec<usize> = contacts.iter().map(|contact| contact.held).collect();
         lengths.sort_unstable();
@@ -248,6 +255,9 @@ impl Frames {
         let (count, left_out) = (contacts.len(), found + without_begin - contacts.len());
         let cut = format!("from {idle} frames before its onset to {held} frames behind it");
         notes.push(format!("{count} contacts, each {cut}; left out, as not whole: {left_out}"));
+        if light > 0 {
+            notes.push(format!("left out, because the sum does not reach half of its usual rise: {light}"));
+        }
         if without_touch > 0 {
             notes.push(format!("runs of frames in which nothing touches the skin: {without_touch}"));
         }
@@ -432,6 +442,13 @@ impl Frames {
         }
         let (least, most) =
             ranges.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, m), r| (l.min(r[0]), m.max(r[1])));
+        if falls(&ranges) {
+            notes.push(
+                "values seem to fall with the load, because most taxels stay where the touched ones begin to fall; they \
+                 are taken to grow: turn them, as largest value − value, before you import them"
+                    .to_owned(),
+            );
+        }
         let changing = ranges.iter().filter(|r| r[1] > r[0]).count();
         if 2 * changing < taxels {
             return;
@@ -526,6 +543,18 @@ fn ends(values: &[f64]) -> (f64, f64) {
     values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), v| (least.min(*v), most.max(*v)))
 }
 
+/// Whether values fall with the load, by the least and the largest one of every taxel: those that hardly change are then
+/// nearer to the upper end of those that change most.
+fn falls(ranges: &[[f64; 2]]) -> bool {
+    let wide = ranges.iter().map(|[least, most]| most - least).filter(|wide| wide.is_finite()).fold(0.0, f64::max);
+    let of = |chosen: &dyn Fn(f64) -> bool, value: &dyn Fn(&[f64; 2]) -> f64| {
+        median(&ranges.iter().filter(|r| chosen(r[1] - r[0])).map(value).collect::<Vec<_>>())
+    };
+    let still = of(&|range| range < 0.25 * wide, &|r| 0.5 * (r[0] + r[1]));
+    let [lower, upper] = [0, 1].map(|end| of(&|range| range > 0.5 * wide, &|r| r[end]));
+    matches!((still, lower, upper), (Some(still), Some(lower), Some(upper)) if upper - still < still - lower)
+}
+
 /// The levels of `values`, which come from two groups: the median of each. The groups are those that differ most for
 /// their sizes (N. Otsu, IEEE Trans. Syst. Man Cybern. 9 (1979) 62).
 fn levels(values: &[f64]) -> [f64; 2] {
@@ -582,6 +611,35 @@ mod tests {
     fn options(unit: FrameUnit, [rows, cols]: [usize; 2]) -> FrameOptions {
         let layout = SkinLayout::with_pitch(rows, cols, 0.01).unwrap();
         FrameOptions { rate_hz: Some(100.0), ..FrameOptions::new("mine", layout, unit) }
+    }
+
+    /// Four touches of two taxels of 6 × 6, one of them light; `of` makes a value of a load from 0 to 1.
+    fn touched(of: fn(f64) -> f64) -> Frames {
+        const LOADS: [f64; 4] = [0.8, 1.0, 0.3, 0.9];
+        let load = |frame: usize, taxel: usize| {
+            let touch = if frame % 20 < 8 { 0.0 } else { LOADS[frame / 20] };
+            0.01 * ((7 * frame + 3 * taxel) % 5) as f64 + if (14..16).contains(&taxel) { touch } else { 0.0 }
+        };
+        let values = (0..80).flat_map(|frame| (0..36).map(move |taxel| of(load(frame, taxel)))).collect();
+        Frames::new(FrameArray { shape: vec![80, 6, 6], values, ..FrameArray::default() }, [6, 6], None).unwrap()
+    }
+
+    #[test]
+    fn values_that_fall_with_the_load_are_told() {
+        let told = |frames: Frames| {
+            let (_, notes) = frames.session(&options(FrameUnit::Codes, [6, 6])).unwrap();
+            notes.iter().any(|note| note.contains("fall with the load"))
+        };
+        let (grows, turned): (fn(f64) -> f64, fn(f64) -> f64) = (|load| 500.0 * load, |load| 1023.0 - 500.0 * load);
+        assert!(!told(touched(grows)) && told(touched(turned)));
+        assert!(!told(touched(grows).cut().unwrap()) && told(touched(turned).cut().unwrap()));
+    }
+
+    #[test]
+    fn touches_that_are_not_cut_are_counted() {
+        let cut = touched(|load| load).cut().unwrap();
+        assert_eq!(cut.shape()[0], 3);
+        assert!(cut.notes.iter().any(|note| note.ends_with("half of its usual rise: 1")), "{:?}", cut.notes);
     }
 
     proptest! {
