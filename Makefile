@@ -91,7 +91,9 @@ browser: setup
 	./scripts/setup.sh chromium
 	./scripts/environment.sh "$(BROWSER)" scripts/browser/requirements.txt
 	cargo build --release --locked --quiet --workspace
-	"$(BROWSER)/bin/python" -m pytest $(PARALLEL) --quiet --tb=short -rs -p no:cacheprovider scripts/browser $(if $(SHOTS),--shots "$(SHOTS)")
+	# not beside the test of how often the live page is updated
+	test -n "$$SPTS_REPORT" || target/release/spts reproduce --quick --out "$(BROWSER)/report" >/dev/null
+	SPTS_REPORT="$${SPTS_REPORT:-$(BROWSER)/report}" "$(BROWSER)/bin/python" -m pytest $(PARALLEL) --quiet --tb=short -rs -p no:cacheprovider scripts/browser $(if $(SHOTS),--shots "$(SHOTS)")
 
 # Speed, beside the named peers.
 bench: setup

@@ -168,7 +168,7 @@ pub fn text(report: &DesignReport) -> String {
     );
     line("binding", format!("{}: {}", report.binding.name(), report.binding_reason));
     if let Ok(designed) = ElectronicsStudy::as_designed() {
-        line("", format!("with the published electronics, {}", designed.one_wire_text(report.one_wire_taxels)));
+        line("", format!("with the electronics of `as_designed`, {}", designed.one_wire_text(report.one_wire_taxels)));
     }
     let alternatives = Table::new("alternatives", &report.alternatives)
         .shown("alternative", |a| &a.what)

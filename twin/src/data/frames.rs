@@ -217,7 +217,7 @@ impl Frames {
             let [low, high] = levels(sums);
             let above = |share: f64| move |k: &usize| sums[*k] > low + share * (high - low);
             let is_touched = |sum: f64| sum > low + LEFT * (high - low);
-            let is_light = |from: usize, to: usize| {
+            let light_in = |from: usize, to: usize| {
                 let runs = sums.get(from..to).unwrap_or_default().chunk_by(|a, b| is_touched(*a) == is_touched(*b));
                 runs.filter(|run| run.len() >= FEWEST_HELD && is_touched(run[0])).count()
             };
@@ -225,7 +225,7 @@ impl Frames {
             while let Some(reached) = (at..sums.len()).find(above(REACHED)) {
                 let rising = (at..reached).rev().take_while(above(TOUCHED)).count();
                 let start = reached - rising;
-                light += is_light(at, start);
+                light += light_in(at, start);
                 let idle = (at..start).rev().take_while(|k| !above(TOUCHED)(k)).count();
                 let held = rising + (reached..sums.len()).take_while(above(LEFT)).count();
                 if idle == 0 {
@@ -235,7 +235,7 @@ impl Frames {
                 }
                 at = start + held;
             }
-            light += is_light(at, sums.len());
+            light += light_in(at, sums.len());
         }
         let mut lengths: Vec<usize> = contacts.iter().map(|contact| contact.held).collect();
         lengths.sort_unstable();
@@ -256,7 +256,7 @@ impl Frames {
         let cut = format!("from {idle} frames before its onset to {held} frames behind it");
         notes.push(format!("{count} contacts, each {cut}; left out, as not whole: {left_out}"));
         if light > 0 {
-            notes.push(format!("left out, because the sum does not reach half of its usual rise: {light}"));
+            notes.push(format!("light touches left out, whose sum does not reach half of the usual rise: {light}"));
         }
         if without_touch > 0 {
             notes.push(format!("runs of frames in which nothing touches the skin: {without_touch}"));
@@ -444,8 +444,8 @@ impl Frames {
             ranges.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, m), r| (l.min(r[0]), m.max(r[1])));
         if falls(&ranges) {
             notes.push(
-                "values seem to fall with the load, because most taxels stay where the touched ones begin to fall; they \
-                 are taken to grow: turn them, as largest value − value, before you import them"
+                "values seem to fall with the load: most taxels stay at the upper end of those that change. Larger \
+                 values are taken for more load; turn yours before the import, as largest value − value"
                     .to_owned(),
             );
         }
@@ -543,16 +543,20 @@ fn ends(values: &[f64]) -> (f64, f64) {
     values.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(least, most), v| (least.min(*v), most.max(*v)))
 }
 
-/// Whether values fall with the load, by the least and the largest one of every taxel: those that hardly change are then
-/// nearer to the upper end of those that change most.
+/// Whether values fall with the load, by the least and the largest one of every taxel: most taxels then hardly change,
+/// and stay where those that change most begin to fall. Not told where the still ones differ much among themselves.
 fn falls(ranges: &[[f64; 2]]) -> bool {
-    let wide = ranges.iter().map(|[least, most]| most - least).filter(|wide| wide.is_finite()).fold(0.0, f64::max);
-    let of = |chosen: &dyn Fn(f64) -> bool, value: &dyn Fn(&[f64; 2]) -> f64| {
-        median(&ranges.iter().filter(|r| chosen(r[1] - r[0])).map(value).collect::<Vec<_>>())
-    };
-    let still = of(&|range| range < 0.25 * wide, &|r| 0.5 * (r[0] + r[1]));
-    let [lower, upper] = [0, 1].map(|end| of(&|range| range > 0.5 * wide, &|r| r[end]));
-    matches!((still, lower, upper), (Some(still), Some(lower), Some(upper)) if upper - still < still - lower)
+    let known = || ranges.iter().filter(|[least, most]| least <= most);
+    let wide = known().map(|[least, most]| most - least).fold(0.0, f64::max);
+    let mut still: Vec<f64> = known().filter(|r| r[1] - r[0] < 0.25 * wide).map(|r| 0.5 * (r[0] + r[1])).collect();
+    let moving: Vec<&[f64; 2]> = known().filter(|r| r[1] - r[0] > 0.5 * wide).collect();
+    let [lower, upper] = [0, 1].map(|end| median(&moving.iter().map(|r| r[end]).collect::<Vec<_>>()));
+    let (Some(lower), Some(upper), Some(middle)) = (lower, upper, median(&still)) else { return false };
+    still.sort_by(f64::total_cmp);
+    let spread = still[3 * still.len() / 4] - still[still.len() / 4];
+    // a single one that moves may be a dropped sample
+    let enough = 2 * still.len() >= ranges.len() && moving.len() > 1;
+    enough && spread < 0.5 * (upper - lower) && upper - middle < middle - lower
 }
 
 /// The levels of `values`, which come from two groups: the median of each. The groups are those that differ most for
@@ -630,16 +634,23 @@ mod tests {
             let (_, notes) = frames.session(&options(FrameUnit::Codes, [6, 6])).unwrap();
             notes.iter().any(|note| note.contains("fall with the load"))
         };
-        let (grows, turned): (fn(f64) -> f64, fn(f64) -> f64) = (|load| 500.0 * load, |load| 1023.0 - 500.0 * load);
-        assert!(!told(touched(grows)) && told(touched(turned)));
-        assert!(!told(touched(grows).cut().unwrap()) && told(touched(turned).cut().unwrap()));
+        let grows = || touched(|load| 500.0 * load);
+        let turned = || touched(|load| 1023.0 - 500.0 * load);
+        assert!(!told(grows()) && told(turned()));
+        assert!(!told(grows().cut().unwrap()) && told(turned().cut().unwrap()));
+        // a dropped sample, stuck taxels under a large contact, spread offsets, a taxel without values
+        let dropped = [[500.0, 700.0], [0.0, 500.0], [500.0, 505.0], [500.0, 505.0], [500.0, 505.0]];
+        let stuck = [[1023.0, 1023.0], [10.0, 400.0], [5.0, 500.0], [0.0, 450.0], [9.0, 480.0]];
+        let spread = [[300.0, 350.0], [250.0, 310.0], [100.0, 105.0], [380.0, 385.0], [420.0, 425.0], [440.0, 445.0]];
+        let empty = [[f64::INFINITY, f64::NEG_INFINITY], [0.0, 50.0], [0.0, 60.0], [0.0, 1.0], [0.0, 1.0]];
+        assert!(!falls(&dropped) && !falls(&stuck) && !falls(&spread) && !falls(&empty) && !falls(&[]));
     }
 
     #[test]
     fn touches_that_are_not_cut_are_counted() {
         let cut = touched(|load| load).cut().unwrap();
         assert_eq!(cut.shape()[0], 3);
-        assert!(cut.notes.iter().any(|note| note.ends_with("half of its usual rise: 1")), "{:?}", cut.notes);
+        assert!(cut.notes.iter().any(|note| note.ends_with("half of the usual rise: 1")), "{:?}", cut.notes);
     }
 
     proptest! {
