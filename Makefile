@@ -84,14 +84,14 @@ book: setup
 	NO_MKDOCS_2_WARNING=1 "$(BOOK)/bin/mkdocs" build --strict
 	$(if $(wildcard $(PYTHON)/bin/python),"$(PYTHON)/bin/python" scripts/docs/run_blocks.py,"$(BOOK)/bin/python" scripts/docs/run_blocks.py --without python) $(BLOCKS)
 
-# The pages that people look at, in a real browser: Debian's Chromium. SHOTS=DIR keeps pictures of them.
+# The pages that people look at, in a real browser: Debian's Chromium. SHOTS=DIR keeps pictures of them. The report is
+# made before the tests, one of which asks how often the live page is updated; SPTS_REPORT=DIR names one that is there.
 BROWSER ?= out/browser
 SHOTS ?=
 browser: setup
 	./scripts/setup.sh chromium
 	./scripts/environment.sh "$(BROWSER)" scripts/browser/requirements.txt
 	cargo build --release --locked --quiet --workspace
-	# not beside the test of how often the live page is updated
 	test -n "$$SPTS_REPORT" || target/release/spts reproduce --quick --out "$(BROWSER)/report" >/dev/null
 	SPTS_REPORT="$${SPTS_REPORT:-$(BROWSER)/report}" "$(BROWSER)/bin/python" -m pytest $(PARALLEL) --quiet --tb=short -rs -p no:cacheprovider scripts/browser $(if $(SHOTS),--shots "$(SHOTS)")
 

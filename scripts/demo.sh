@@ -17,11 +17,11 @@ step() {
   printf '%s: done in %d min %02d s\n' "${title%%:*}" $(((SECONDS - start) / 60)) $(((SECONDS - start) % 60))
 }
 
-build="building: about four minutes on two cores the first time, seconds after that"
+build="building: four to eight minutes on two cores the first time, seconds after that"
 [ -x target/release/spts ] && build="building what has changed since the last time"
 press="a first press, some seconds: the letter T on the skin, and what one wire tells of it"
-page="the report, three to four minutes on two cores: 17 objects pressed, a ball bounced, decoders learned and scored"
-[ -n "$recordings" ] && page="the report, six to seven minutes on two cores: 17 objects and a ball, beside the recordings in $recordings"
+page="the report, three to six minutes on two cores: 17 objects pressed, a ball bounced, decoders learned and scored"
+[ -n "$recordings" ] && page="the report, six minutes or more on two cores: 17 objects and a ball, beside the recordings in $recordings"
 
 step 1 "$build" ./scripts/build.py --release --locked --workspace
 step 2 "$press" ./target/release/spts simulate press/T --out "$first"

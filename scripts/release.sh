@@ -25,4 +25,4 @@ for target in "$@"; do
     gzip --no-name --best >"$folder/$name.tar.gz"
 done
 python3 scripts/licences.py "$@" >"$folder/licences.csv"
-(cd "$folder" && sha256sum -- *.whl *.tar.gz licences.csv >SHA256SUMS && cat SHA256SUMS)
+(cd "$folder" && sha256sum -- *.whl *.tar.gz licences.csv >SHA256SUMS && cat SHA256SUMS && du --apparent-size --block-size=kB -- *)

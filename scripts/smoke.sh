@@ -32,6 +32,7 @@ shapes=(dataset make random-shapes --rows 200 --out)
 inside python3 -m venv /venv
 inside pip install --quiet --no-index --find-links /wheels spts-twin
 inside spts --version
+echo "$(inside du --summarize --block-size=MB /venv | cut -f 1) with NumPy"
 program=$(cd "$root" && echo opt/spts-*/bin/spts)
 inside "/$program" firmware verify --edges 200 | tail -n 1
 inside "/$program" design --area 0.15x0.15 --resolution 15mm --latency 2ms --iou 0.7 --objects large --out /design | sed -n '/^expected/p'
