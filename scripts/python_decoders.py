@@ -3,8 +3,9 @@
 python scripts/python_decoders.py [--presses N] [--skins NAME,...] [--json]
 
 Objects are pressed on taxels chosen at random ("middle": those within 20 mm of the middle), turned anyhow, 0.8 to 2 mm
-deep, on simulated skins, each press on another specimen. Every decoder sees the same windows. It prints the mean intersection over union with the true pressure for M of 7,
-20 and 50 % of the taxels, skin by skin and object by object, and the time of a decode.
+deep, on simulated skins, each press on another specimen. Every decoder sees the same windows. It prints the mean
+intersection over union with the true pressure for M of 7, 20 and 50 % of the taxels, skin by skin and object by object,
+and the time of a decode. Needs `mujoco` and `gymnasium`, whose humanoid has the links.
 """
 
 from __future__ import annotations
@@ -12,12 +13,16 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import pathlib
 import time
 
+import gymnasium
+import mujoco
 import numpy as np
 import spts
+import spts.mujoco
 
-DECODERS = ["nn_lasso", "nn_lmmse", "tv", "amortised", "mixture"]
+DECODERS = ["nn_lasso", "nn_lmmse", "tv", "patches", "mixture", "amortised"]
 SHARES = [0.07, 0.2, 0.5]
 READOUTS = ["ideal", "as_built"]
 OBJECTS = {
@@ -38,15 +43,28 @@ def dome(taxels, radius):
     return spts.Skin.from_points(radius * normals, normals, np.full(taxels, 2 * np.pi * radius**2 / taxels))
 
 
+def link(name):
+    """A link of gymnasium's humanoid with a taxel every 2 cm."""
+    file = pathlib.Path(gymnasium.__file__).parent / "envs/mujoco/assets/humanoid.xml"
+    model = mujoco.MjModel.from_xml_path(str(file))
+    robot = spts.mujoco.dress(model, mujoco.MjData(model), pitch=0.02)
+    return robot.skins[robot.names.index(name)]
+
+
 SKINS = {
     "flat, 10 x 10": lambda: spts.Skin(10, 10, 0.015),
     "flat, 10 x 10, middle": lambda: spts.Skin(10, 10, 0.015),
     "flat, 8 x 8": lambda: spts.Skin(8, 8, 0.01),
     "flat, 20 x 20": lambda: spts.Skin(20, 20, 0.0075),
+    "strip, 1 x 64": lambda: spts.Skin(1, 64, 0.01),
+    "strip, 3 x 60": lambda: spts.Skin(3, 60, 0.01),
     "half a tube, 12 x 16": lambda: spts.Skin.cylinder(0.04, 12, 16, span=(-0.06, 0.06), arc=(-1.5, 1.5)),
     "fingertip, 40 points": lambda: dome(40, 0.012),
     "dome, 150 points": lambda: dome(150, 0.03),
     "dome, 600 points": lambda: dome(600, 0.03),
+    "foot, 172 points": lambda: link("left_foot"),
+    "upper arm, 244 points": lambda: link("left_upper_arm"),
+    "torso, 800 points": lambda: link("torso"),
 }
 
 

@@ -104,8 +104,8 @@ def pitch_of(places):
 def auto(skin):
     """Name of the decoder that "auto" stands for on a skin: the best of those that need no recordings.
 
-    It is "amortised" on grids of six rows and columns or more, "patches" on more than 2,048 taxels, and "mixture" where
-    the numbers of the taxels do not tell which are neighbours (docs/decoders.md, "Which one").
+    It is "amortised" on up to 2,048 taxels, in a grid or in any order, and "patches" on more (docs/python.md, "Which
+    decoder").
 
     Parameters
     ----------

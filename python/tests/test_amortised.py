@@ -83,6 +83,18 @@ def test_one_network_serves_every_sheet():
         assert np.mean(found) > 0.9, (rows, cols)
 
 
+@pytest.mark.parametrize("shape, m", [((32, 32), 600), ((1, 800), 450), ((10, 10), 400)])
+def test_many_samples_without_noise(shape, m):
+    """None of which the network was trained on."""
+    rng = np.random.default_rng(3)
+    for size in (1, 4):
+        truth = np.zeros(shape)
+        truth[min(3, shape[0] // 2) :, 4:][:size, :size] = 0.3
+        phi = rng.choice([-1.0, 1.0], (m, truth.size))
+        image = spts.decode(phi, phi @ truth.ravel(), shape, decoder="amortised")
+        assert spts.iou(image[None], truth[None])[0] > 0.9, (shape, m, size)
+
+
 def test_sheets_that_are_none_are_refused():
-    with pytest.raises(ValueError, match="cols.*512"):
-        spts.decode(np.ones((3, 600)), np.ones(3), shape=(1, 600), decoder="amortised")
+    with pytest.raises(ValueError, match="cols.*2048"):
+        spts.decode(np.ones((3, 3000)), np.ones(3), shape=(1, 3000), decoder="amortised")

@@ -93,7 +93,7 @@ def test_a_wire_measures_an_array():
 
 
 def test_auto():
-    assert (spts.auto((10, 10)), spts.auto((50, 50)), spts.auto((1, 600))) == ("amortised", "patches", "mixture")
+    assert (spts.auto((10, 10)), spts.auto((50, 50)), spts.auto((1, 600))) == ("amortised", "patches", "amortised")
     assert spts.auto(spts.Skin(16, 16, 0.005)) == "amortised"
     phi = RNG.choice([-1.0, 1.0], (60, 144))
     image = np.zeros((12, 12))

@@ -52,7 +52,7 @@ pub(super) struct DecodeCommand {
     #[arg(long = "session", value_name = "NAME,...", value_delimiter = ',')]
     only: Vec<String>,
     /// Decoders; `spts score --list` shows their names. `auto` stands for the decoder that needs no knowledge of the
-    /// objects: `patches` on more than 2048 taxels, `mixture` on fewer than six rows or columns, else `amortised`
+    /// objects: `patches` on more than 2048 taxels, else `amortised`
     #[arg(long, value_name = "NAME,...", value_delimiter = ',', default_value = AUTO)]
     decoder: Vec<String>,
     /// Numbers of samples M that an image is decoded from; each [1, 1000000] [default: 7, 20 and 50 % of the taxels,

@@ -387,7 +387,7 @@ struct Scratch {
 
 impl Unrolled {
     /// Most rows, and most columns, of a sheet.
-    pub const MOST_SIDE: usize = 512;
+    pub const MOST_SIDE: usize = 2048;
     /// Most taxels of a sheet.
     pub const MOST_TAXELS: usize = 1 << 14;
 
@@ -399,7 +399,7 @@ impl Unrolled {
         let weights = weights.into();
         for (side, size) in ["rows", "cols"].into_iter().zip(shape) {
             if !(1..=Self::MOST_SIDE).contains(&size) {
-                return Err(Refusal::range(side, size as f64, "[1, 512]"));
+                return Err(Refusal::range(side, size as f64, "[1, 2048]"));
             }
         }
         if shape[0] * shape[1] > Self::MOST_TAXELS {

@@ -175,31 +175,22 @@ pub fn find(name: &str) -> Option<&'static DecoderSpec> {
 /// Name that stands for the decoder that [`auto`] chooses.
 pub const AUTO: &str = "auto";
 
-/// Fewest rows, and fewest columns, of the sheets that the network that ships was trained for.
-const NARROWEST: usize = 6;
-
 /// The decoder for images of anything on a skin of `shape` (rows and columns), when nothing is known of the objects:
 ///
-/// 1. `amortised`, where a network is given (`own_network`), and on grids of 6 × 6 to 2,048 taxels;
-/// 2. `patches` on skins of more than 2,048 taxels, where the others take seconds and gigabytes;
-/// 3. `mixture` on all others: where the numbers of taxels do not tell which are neighbours.
+/// `amortised` on up to 2,048 taxels, in a grid or in any order, and where a network is given (`own_network`);
+/// `patches` on more, where the others take seconds and gigabytes.
 ///
-/// docs/decoders.md has the measurements behind the rule.
+/// docs/python.md has the measurements behind the rule.
 ///
 /// ```
 /// use spts_eval::decoders::auto;
 ///
-/// assert_eq!((auto([10, 10], false).name, auto([32, 32], false).name), ("amortised", "amortised"));
-/// assert_eq!((auto([1, 600], false).name, auto([1, 100], true).name), ("mixture", "amortised"));
-/// assert_eq!(auto([100, 100], false).name, "patches");
+/// assert_eq!((auto([10, 10], false).name, auto([1, 600], false).name), ("amortised", "amortised"));
+/// assert_eq!((auto([100, 100], false).name, auto([100, 100], true).name), ("patches", "amortised"));
 /// ```
 pub fn auto([rows, cols]: [usize; 2], own_network: bool) -> &'static DecoderSpec {
-    let name = match rows.saturating_mul(cols) {
-        _ if own_network => "amortised",
-        taxels if taxels > TrainingData::MOST_TAXELS => "patches",
-        _ if rows.min(cols) >= NARROWEST => "amortised",
-        _ => "mixture",
-    };
+    let large = rows.saturating_mul(cols) > TrainingData::MOST_TAXELS;
+    let name = if large && !own_network { "patches" } else { "amortised" };
     find(name).unwrap_or(&DECODERS[0])
 }
 
