@@ -104,8 +104,8 @@ def pitch_of(places):
 def auto(skin):
     """Name of the decoder that "auto" stands for on a skin: the best of those that need no recordings.
 
-    It is "amortised" on up to 2,048 taxels, in a grid or in any order, and "patches" on more (docs/python.md, "Which
-    decoder").
+    It is "amortised" on up to 2,048 taxels, and "patches" on more (docs/python.md, "Which decoder"). Where the numbers of
+    neighbouring taxels have nothing to do with each other, "mixture" shows broad touches better.
 
     Parameters
     ----------

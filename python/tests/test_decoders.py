@@ -107,7 +107,8 @@ def ball_of_points(taxels, radius):
 
 
 def test_taxels_count_by_their_places():
-    """On a skin from points the image is good where the skin is told, and poor where only the number of taxels is."""
+    """On a skin from points the image of what learns is good where the skin is told, and poor where only the number of
+    taxels is."""
     skin, ball = ball_of_points(150, 0.03), spts.Body.sphere(0.2)
     found = {"skin": [], "shape": []}
     for seed in range(20):
@@ -117,7 +118,7 @@ def test_taxels_count_by_their_places():
         touch = skin.touch({ball: (place, (1.0, 0.0, 0.0, 0.0))}, dt=0.1)
         y, phi = spts.Wire(skin, seed=seed).record(touch, 30)
         for name, told in (("skin", skin), ("shape", skin.shape)):
-            found[name].append(spts.iou(spts.decode(phi, y, told)[None], touch.pressure[None])[0])
+            found[name].append(spts.iou(spts.decode(phi, y, told, "mixture")[None], touch.pressure[None])[0])
     means = {name: np.mean(scores) for name, scores in found.items()}
     assert means["skin"] > 0.6 and means["skin"] > means["shape"] + 0.2, means
 
