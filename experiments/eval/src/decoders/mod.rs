@@ -176,9 +176,8 @@ pub fn find(name: &str) -> Option<&'static DecoderSpec> {
 pub const AUTO: &str = "auto";
 
 /// The decoder for images of anything on a skin of `shape` (rows and columns), when nothing is known of the objects:
-///
-/// `amortised` on up to 2,048 taxels, and where a network is given (`own_network`);
-/// `patches` on more, where the others take seconds and gigabytes.
+/// `amortised` on up to 2,048 taxels, and where a network is given (`own_network`), `patches` on more, where the others
+/// take seconds and gigabytes.
 ///
 /// docs/python.md has the measurements behind the rule.
 ///
