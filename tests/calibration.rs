@@ -2,7 +2,7 @@
 //! not do.
 
 use crate::command::{json, succeeds};
-use crate::recordings::recordings;
+use crate::recordings::{recordings, recordings_without};
 use serde_json::Value;
 use spts_circuit::Profile;
 use std::path::Path;
@@ -157,12 +157,12 @@ fn the_twin_s_objects_are_the_skin_s() {
     assert!(dir.path().join("out/compare/figures/per_object.svg").is_file());
 }
 
-/// The numbers do not depend on the number of threads.
+/// The numbers of two sessions do not depend on the number of threads.
 #[test]
 fn threads_do_not_show() {
-    let Some(recordings) = recordings() else { return };
     let dir = tempfile::tempdir().unwrap();
-    let source = recordings.to_str().unwrap();
+    let Some(two) = recordings_without(&["center", "eraser", "rec"], dir.path()) else { return };
+    let source = two.to_str().unwrap();
     let told = |threads: &str| {
         let calibrated = succeeds(dir.path(), &["calibrate", source, "--json", "--threads", threads]);
         let compared = succeeds(dir.path(), &["compare", source, "--no-curves", "--json", "--threads", threads]);

@@ -16,6 +16,24 @@ pub(crate) fn recordings() -> Option<PathBuf> {
     found
 }
 
+/// The recordings without the presses of the objects `left_out`, which are linked into `folder`.
+pub(crate) fn recordings_without(left_out: &[&str], folder: &Path) -> Option<PathBuf> {
+    let all = recordings()?;
+    let link = |from: &Path, to: &Path| {
+        std::fs::create_dir_all(to).unwrap();
+        for entry in std::fs::read_dir(from).unwrap().map(Result::unwrap) {
+            let name = entry.file_name();
+            if name != "presses" && !left_out.iter().any(|object| name == *object) {
+                std::os::unix::fs::symlink(entry.path(), to.join(name)).unwrap();
+            }
+        }
+    };
+    let some = folder.join("recordings");
+    link(&all, &some);
+    link(&all.join("presses"), &some.join("presses"));
+    Some(some)
+}
+
 /// Numbers of measurements of the table.
 const M: [u64; 6] = [5, 10, 20, 25, 50, 100];
 

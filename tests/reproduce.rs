@@ -1,14 +1,15 @@
 //! The report: complete, within its promises, and the same for any number of threads.
 
 use crate::command::{files, succeeds, words};
-use crate::recordings::recordings;
+use crate::recordings::recordings_without;
 use serde_json::Value;
 use std::path::Path;
 
 #[test]
 fn a_quick_report_is_complete_and_does_not_depend_on_the_threads() {
     let dir = tempfile::tempdir().unwrap();
-    let real = recordings();
+    // three of the five objects whose samples take the time
+    let real = recordings_without(&["center", "eraser", "rec"], dir.path());
     for threads in ["1", "2"] {
         let mut arguments = vec!["reproduce", "--quick", "--threads", threads, "--out", threads];
         if let Some(path) = &real {

@@ -13,8 +13,11 @@ DEFAULT = "auto"
 
 # Decoders that learn from images without labels.
 _TAUGHT = {name for name, _, needs in decoder_table() if needs == "images"} | {"mixture"}
-# Most taxels of a decoder.
+# Decoders that take neighbours from rows and columns; taxels in one row are arranged on a grid by their places.
+_NEIGHBOURS = {"amortised", "tv", "patches"}
+# Most taxels of a decoder, and most that are arranged.
 MOST_TAXELS = 2048
+_MOST_ARRANGED = 16_384
 # Half sizes of the touches of a prior: the least as a share of the pitch, the most as a share of the skin's extent.
 _LEAST, _MOST = 0.35, 0.25
 # Scatter of the gains of a skin's taxels, as standard deviation of the logarithm.
@@ -104,8 +107,7 @@ def pitch_of(places):
 def auto(skin):
     """Name of the decoder that "auto" stands for on a skin: the best of those that need no recordings.
 
-    It is "amortised" on up to 2,048 taxels, and "patches" on more (docs/python.md, "Which decoder"). Where the numbers of
-    neighbouring taxels have nothing to do with each other, "mixture" shows broad touches better.
+    It is "amortised" on up to 2,048 taxels, and "patches" on more (docs/python.md, "Which decoder").
 
     Parameters
     ----------
@@ -132,8 +134,11 @@ def learned(decoder, skin, images=None, labels=None):
         decoder = auto_decoder(*shape)
     if images is not None:
         return Decoder(decoder, shape, images, labels)
+    taxels = shape[0] * shape[1]
+    if decoder in _NEIGHBOURS and isinstance(skin, Skin) and 1 in shape and taxels <= _MOST_ARRANGED:
+        return _arranged(decoder, shape, *_key(skin))
     # what cannot be is refused there
-    if decoder not in _TAUGHT or not 1 <= shape[0] * shape[1] <= MOST_TAXELS:
+    if decoder not in _TAUGHT or not 1 <= taxels <= MOST_TAXELS:
         return _untaught(decoder, shape)
     return _taught(decoder, shape, *_key(skin if isinstance(skin, Skin) else shape))
 
@@ -144,6 +149,15 @@ def learned_of(decoder, parts, count=3000):
     taxels = sum(len(numbers) for numbers, *_ in parts)
     if decoder == DEFAULT:
         decoder = auto_decoder(1, taxels)
+    if decoder in _NEIGHBOURS:
+        at, outwards = np.zeros((2, taxels, 3))
+        end = 0.0
+        for numbers, places, normals in parts:
+            # beside each other, with a gap
+            at[numbers] = places - places.min(axis=0) + (end, 0.0, 0.0)
+            outwards[numbers] = normals
+            end = at[numbers, 0].max() + 5.0 * pitch_of(places)
+        return Decoder(decoder, (1, taxels), surface=(at, outwards))
     if decoder not in _TAUGHT:
         return _untaught(decoder, (1, taxels))
     images = []
@@ -163,6 +177,12 @@ def _key(skin):
 @functools.lru_cache(maxsize=32)
 def _untaught(decoder, shape):
     return Decoder(decoder, shape)
+
+
+@functools.lru_cache(maxsize=32)
+def _arranged(decoder, shape, places, normals):
+    surface = tuple(np.frombuffer(array).reshape(-1, 3) for array in (places, normals))
+    return Decoder(decoder, shape, surface=surface)
 
 
 @functools.lru_cache(maxsize=32)

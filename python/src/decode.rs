@@ -1,9 +1,10 @@
 //! Decoders that have learned.
 
-use crate::args::Array2;
+use crate::args::{Array2, triples};
 use crate::common::{refuse, released};
 use numpy::{
-    IntoPyArray as _, PyArray1, PyArray2, PyArrayMethods as _, PyReadonlyArray1, PyReadonlyArray2, PyReadonlyArray3,
+    AllowTypeChange, IntoPyArray as _, PyArray1, PyArray2, PyArrayLike2, PyArrayMethods as _, PyReadonlyArray1,
+    PyReadonlyArray2, PyReadonlyArray3,
 };
 use pyo3::prelude::*;
 use pyo3::types::{PyTuple, PyType};
@@ -13,6 +14,7 @@ use spts::recon::classify::{Library, Src};
 use spts::recon::{Matrix, Workspace};
 use spts_eval::algorithm::{Answer, Class, Trained};
 use spts_eval::decoders::{DECODERS, Needs, auto, find};
+use spts_eval::placed::Arrangement;
 use spts_eval::training::TrainingData;
 use spts_eval::{Press, PressRows};
 use std::sync::Arc;
@@ -38,6 +40,9 @@ const SLICE: usize = 256;
 ///     Raster images to learn from, in any unit; default random shapes on the layout.
 /// labels : ndarray (n,) of int, optional
 ///     Class of every image, from 0; default one class.
+/// surface : (ndarray (taxels, 3), ndarray (taxels, 3)), optional
+///     Places, m, and normals of the taxels, for a decoder that learns from no images: which taxels are neighbours then
+///     follows from them and not from `shape`. At most 16,384 taxels.
 #[pyclass(frozen, module = "spts._spts")]
 pub(crate) struct Decoder {
     trained: Arc<dyn Trained>,
@@ -50,18 +55,23 @@ pub(crate) struct Decoder {
     /// What it has learned from, for its copies in other processes: they learn again.
     images: Option<Py<PyArray2<f64>>>,
     labels: Option<Py<PyArray1<i64>>>,
+    surface: Option<Surface>,
 }
+
+/// Places and normals of the taxels.
+type Surface = (Py<PyArray2<f64>>, Py<PyArray2<f64>>);
 
 #[pymethods]
 impl Decoder {
     #[new]
-    #[pyo3(signature = (name, shape, images = None, labels = None))]
+    #[pyo3(signature = (name, shape, images = None, labels = None, surface = None))]
     fn new(
         py: Python<'_>,
         name: &str,
         shape: (usize, usize),
         images: Option<PyReadonlyArray2<'_, f64>>,
         labels: Option<PyReadonlyArray1<'_, i64>>,
+        surface: Option<(PyArrayLike2<'_, f64, AllowTypeChange>, PyArrayLike2<'_, f64, AllowTypeChange>)>,
     ) -> PyResult<Self> {
         let Some(spec) = find(name) else {
             let known: Vec<&str> = DECODERS.iter().map(|spec| spec.name).collect();
@@ -71,6 +81,18 @@ impl Decoder {
         if taxels == 0 || taxels > MOST_TAXELS {
             bail!("`shape` = {shape:?}: its taxels are outside [1, {MOST_TAXELS}]");
         }
+        let placed = match &surface {
+            None => None,
+            Some(_) if images.is_some() => bail!("`surface`: images are learned from taxel by taxel"),
+            Some((places, normals)) => {
+                let (places, normals) = (triples("places", places)?, triples("normals", normals)?);
+                if places.len() != taxels {
+                    bail!("`surface` has {} places; {taxels} are needed, one a taxel", places.len());
+                }
+                Some(released(py, || Arrangement::new(&places, &normals))?.map_err(refuse)?)
+            }
+        };
+        let grid = placed.as_ref().map_or([shape.0, shape.1], Arrangement::shape);
         let learned = match &images {
             Some(images) => {
                 let images = images_in(images, taxels)?;
@@ -81,7 +103,7 @@ impl Decoder {
                 bail!("`images`: \"{name}\" learns from raster images of named objects");
             }
             None => {
-                let layout = SkinLayout::with_pitch(shape.0, shape.1, 0.015).map_err(refuse)?;
+                let layout = SkinLayout::with_pitch(grid[0], grid[1], 0.015).map_err(refuse)?;
                 released(py, || match spec.needs {
                     Needs::Shapes => TrainingData::for_shapes(&layout, Streams::new(0)),
                     _ => TrainingData::for_layout(&layout, Streams::new(0)),
@@ -89,12 +111,17 @@ impl Decoder {
             }
         };
         let data = learned.map_err(refuse)?;
+        let trained: Arc<dyn Trained> = released(py, || (spec.train)(&data))?.map_err(refuse)?.into();
         Ok(Self {
-            trained: released(py, || (spec.train)(&data))?.map_err(refuse)?.into(),
+            trained: match placed {
+                Some(placed) => placed.place(trained),
+                None => trained,
+            },
             name: spec.name,
             shape,
             images: images.map(|images| copied(py, &images)),
             labels: labels.map(|labels| copied(py, &labels)),
+            surface: surface.map(|(places, normals)| (copied(py, &places), copied(py, &normals))),
         })
     }
 
@@ -165,6 +192,7 @@ impl Decoder {
             trained: Arc::clone(&self.trained),
             images: self.images.as_ref().map(|images| images.clone_ref(py)),
             labels: self.labels.as_ref().map(|labels| labels.clone_ref(py)),
+            surface: self.surface.as_ref().map(|(places, normals)| (places.clone_ref(py), normals.clone_ref(py))),
             name: self.name,
             shape: self.shape,
         }
@@ -176,7 +204,8 @@ impl Decoder {
 
     fn __reduce__<'py>(slf: &Bound<'py, Self>) -> PyResult<(Bound<'py, PyType>, Bound<'py, PyTuple>)> {
         let (py, own) = (slf.py(), slf.get());
-        let arguments = (own.name, own.shape, own.images.as_ref(), own.labels.as_ref()).into_pyobject(py)?;
+        let arguments =
+            (own.name, own.shape, own.images.as_ref(), own.labels.as_ref(), own.surface.as_ref()).into_pyobject(py)?;
         Ok((slf.get_type(), arguments))
     }
 

@@ -199,8 +199,9 @@ def test_decoders(how, skin, pressed):
         taught[:] = images
     classifier = spts.decoders.SparseClassifier(3).fit(images, labels)
     assert np.array_equal(HOWS[how](classifier).predict(images), classifier.predict(images))
-    inner = spts._spts.Decoder("omp", (10, 10))
-    assert np.array_equal(HOWS[how](inner).decode(phi, y), inner.decode(phi, y))
+    surface = (skin.positions[::-1], skin.normals)
+    for inner in spts._spts.Decoder("omp", (10, 10)), spts._spts.Decoder("tv", (1, 100), surface=surface):
+        assert np.array_equal(HOWS[how](inner).decode(phi, y), inner.decode(phi, y))
 
 
 @pytest.fixture(scope="module")

@@ -1,23 +1,9 @@
 //! Convolution of a rectangle of cells with an even kernel by fast Fourier transforms.
 
 use super::influence::Influence;
-use realfft::num_complex::Complex;
-use realfft::num_traits::{AsPrimitive, Zero as _};
-use realfft::{ComplexToReal, FftNum, RealFftPlanner, RealToComplex};
-use rustfft::{Fft, FftPlanner};
+use spts_fft::num_traits::{AsPrimitive, Zero as _};
+use spts_fft::{Complex, ComplexPlans, ComplexToReal, Fft, FftNum, Planner, RealPlans, RealToComplex};
 use std::sync::Arc;
-
-/// Plans of one precision, shared by all sizes.
-pub(crate) struct Planner<T: FftNum> {
-    rows: RealFftPlanner<T>,
-    cols: FftPlanner<T>,
-}
-
-impl<T: FftNum> Planner<T> {
-    pub(crate) fn new() -> Self {
-        Self { rows: RealFftPlanner::new(), cols: FftPlanner::new() }
-    }
-}
 
 /// Columns transformed together: a row's share of them fills one or two cache lines.
 const BLOCK: usize = 8;
@@ -49,21 +35,17 @@ impl<T: FftNum + AsPrimitive<f64>> Convolution<T>
 where
     f64: AsPrimitive<T>,
 {
-    /// Convolution of `[rows, cols]` cells on the `padded` rectangle (second length even), the kernel at the offset
-    /// (i, j) being `kernel(i, j)`, 2 i ≤ rows, 2 j ≤ cols of the padded rectangle. `transfer` maps the kernel's
-    /// spectrum to the one used.
+    /// Convolution of `[rows, cols]` cells on the `padded` rectangle (second length even), for whose rows and columns
+    /// the plans are. The kernel at the offset (i, j) is `kernel(i, j)`, 2 i ≤ rows, 2 j ≤ cols of the padded
+    /// rectangle. `transfer` maps the kernel's spectrum to the one used.
     pub(crate) fn new(
-        planner: &mut Planner<T>,
+        ((row_forward, row_inverse), (col_forward, col_inverse)): (RealPlans<T>, ComplexPlans<T>),
         [rows, cols]: [usize; 2],
         padded: [usize; 2],
         kernel: impl Fn(usize, usize) -> f64,
         transfer: impl Fn(f64) -> f64,
     ) -> Self {
         let [tall, wide] = padded;
-        let row_forward = planner.rows.plan_fft_forward(wide);
-        let row_inverse = planner.rows.plan_fft_inverse(wide);
-        let col_forward = planner.cols.plan_fft_forward(tall);
-        let col_inverse = planner.cols.plan_fft_inverse(tall);
         let scratch = row_forward
             .get_scratch_len()
             .max(row_inverse.get_scratch_len())
@@ -208,7 +190,7 @@ pub(crate) struct Planners {
 
 impl Planners {
     pub(crate) fn new() -> Self {
-        Self { double: Planner::new(), single: Planner::new() }
+        Self { double: Planner::<f64>::new(), single: Planner::<f32>::new() }
     }
 }
 
@@ -253,14 +235,16 @@ impl System {
         };
         let padded = shape.map(|n| good_size(2 * n - 1));
         let inside = |i: usize, j: usize| if i < shape[0] && j < shape[1] { at(i, j) } else { 0.0 };
-        let elastic = Convolution::new(&mut planners.double, shape, padded, inside, |c| c);
+        let plans = (planners.double.real(padded[1]), planners.double.complex(padded[0]));
+        let elastic = Convolution::new(plans, shape, padded, inside, |c| c);
         let torus = shape.map(|n| good_size(n + TORUS_PADDING));
         let floor = FLOOR * at(0, 0);
         let scale = 1.0 / at(0, 0);
         // single precision does not reach down to 1e-12 m/Pa squared: work in units of the cell's own coefficient
         let relative = |i: usize, j: usize| at(i, j) * scale;
         let invert = |c: f64| 1.0 / c.max(floor * scale);
-        let inverse = Convolution::new(&mut planners.single, shape, torus, relative, invert);
+        let plans = (planners.single.real(torus[1]), planners.single.complex(torus[0]));
+        let inverse = Convolution::new(plans, shape, torus, relative, invert);
         let cells = shape[0] * shape[1];
         let stiffness_pa_per_m = inverse.mean_transfer() * scale;
         Self {

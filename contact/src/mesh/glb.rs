@@ -94,7 +94,7 @@ impl<'a> Glb<'a> {
             return Err(too_large(file, "bytes of the JSON chunk", found, MAX_JSON_BYTES));
         }
         let glb = gltf::Glb::from_slice(bytes).map_err(|e| malformed(file, e))?;
-        let root: Root = gltf::json::deserialize::from_slice(&glb.json).map_err(|e| malformed(file, e))?;
+        let root: Root = Root::from_slice(&glb.json).map_err(|e| malformed(file, e))?;
         let blob = glb.bin.unwrap_or_default();
         Ok(Self { root, blob, file })
     }

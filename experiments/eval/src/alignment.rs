@@ -31,13 +31,12 @@
 use crate::chunk::{Chunk, Fit, chunk_len, converter_step_v};
 use crate::place::{RecordedBounce, find_bounces};
 use rayon::prelude::*;
-use realfft::RealFftPlanner;
-use realfft::num_complex::Complex;
 use serde::{Deserialize, Serialize};
 use spts::Session;
 use spts::data::SessionSet;
 use spts::session::Event;
 use spts_circuit::{Mode, Recording, Slip};
+use spts_fft::{Complex, Planner};
 use spts_recon::metrics::median;
 use spts_recon::statistics::Sample;
 use std::ops::{Range, RangeInclusive};
@@ -203,8 +202,7 @@ fn correlation_energies(phi: &[f64], taxels: usize, y: &[f64]) -> Vec<f64> {
     const MULTIPLE: usize = 1024;
     let rows = phi.len() / taxels;
     let len = rows.next_multiple_of(MULTIPLE);
-    let mut planner = RealFftPlanner::<f64>::new();
-    let (forward, inverse) = (planner.plan_fft_forward(len), planner.plan_fft_inverse(len));
+    let (forward, inverse) = Planner::<f64>::new().real(len);
     let (mut values, mut spectrum) = (forward.make_input_vec(), forward.make_output_vec());
     let mut scratch = forward.make_scratch_vec();
     scratch.resize(scratch.len().max(inverse.get_scratch_len()), Complex::default());

@@ -16,6 +16,7 @@ pub mod external;
 pub mod in_time;
 mod labels;
 pub mod place;
+pub mod placed;
 pub mod protocol;
 mod published;
 mod scorer;

@@ -188,13 +188,13 @@ impl ReproductionSize {
 
     /// A look at everything in a minute: fewer presses, windows and numbers of measurements.
     pub(super) fn quick() -> Self {
-        let few = Protocol { presses: 2, max_windows: 60, support_stride: 20, ..Protocol::default() };
+        let few = Protocol { presses: 2, max_windows: 30, support_stride: 20, ..Protocol::default() };
         Self {
             raster_presses: 3,
             learning: Learning { presses: 0..2, training_images: 500, sweeps: 5 },
             compressive_presses: 2,
-            measurements: vec![5, 10, 20, 25, 50, 100],
-            localisation: vec![5, 7, 10, 15, 20, 25, 50, 100],
+            measurements: vec![5, 10, 20, 25, 50],
+            localisation: vec![5, 10, 20, 25, 50],
             timed_decodes: 500,
             protocol: Protocol { first_press: 0, ..few },
             raster_protocol: Protocol { first_press: 2, ..few },
