@@ -17,7 +17,7 @@ fn touches_of_the_arm_are_located() {
         return;
     }
     let dir = tempfile::tempdir().unwrap();
-    let arguments = ["--no-times", "--decoder", "correlate", "--measurements", "7,10,20,25", "--object", "trig"];
+    let arguments = ["--no-times", "--decoder", "correlate", "--measurements", "7,10,25", "--object", "trig"];
     let Some(board) = score(dir.path(), &arguments) else {
         return;
     };

@@ -204,10 +204,10 @@ struct Training<'a> {
 }
 
 impl<'a> Training<'a> {
-    /// From the sessions of `set`. When one of them cannot be scored, or they are of several layouts, nothing is
+    /// From the sessions of `set`, which have been realigned. When one of them cannot be scored, or they are of several layouts, nothing is
     /// learned from any, and a note says why.
     fn new(set: &SessionSet, skin: Option<&'a Path>, seed: u64) -> Self {
-        let source = Source::new(set.clone());
+        let source = Source::aligned(set.clone(), Alignment::default());
         if let (Err(error), None) = (&source, skin) {
             note(&format!("note: nothing is learned from these recordings: {error}"));
         }

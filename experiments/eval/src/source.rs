@@ -87,6 +87,14 @@ impl Source {
     /// [`Refusal`] for a session with nothing to score, or of another skin than the first.
     pub fn new(mut set: SessionSet) -> Result<Self, Refusal> {
         let alignment = follow_slips(&mut set);
+        Self::aligned(set, alignment)
+    }
+
+    /// The same of a set that [`follow_slips`] has realigned, with what it returned.
+    ///
+    /// # Errors
+    /// As [`Self::new`].
+    pub fn aligned(set: SessionSet, alignment: Alignment) -> Result<Self, Refusal> {
         let SessionSet { root, sessions, published, mut missing, note } = set;
         let simulated = sessions.iter().all(|s| s.provenance.is_some());
         let (presses, others): (Vec<Session>, Vec<Session>) =
