@@ -173,7 +173,8 @@ fn lost_edges_are_noted() {
     let mut profile: toml::Table = toml::from_str(PROFILES[0].1).unwrap();
     profile.insert("sample_rate_hz".to_owned(), toml::Value::Float(3.2e5));
     std::fs::write(dir.path().join("fast.toml"), profile.to_string()).unwrap();
-    let scene = "weights = \"firmware\"\nreadout = \"fast.toml\"\n[skin]\nrows = 4\ncols = 4\n[press]\nobject = \"T\"\npresses = 1";
+    let scene = "weights = \"firmware\"\nreadout = \"fast.toml\"\n[skin]\nrows = 4\ncols = 4\n[press]\n\
+                 object = \"T\"\npresses = 1";
     std::fs::write(dir.path().join("scene.toml"), scene).unwrap();
     let output = succeeds(dir.path(), &["simulate", "scene.toml", "--json", "--out", "out"]);
     let summary: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();

@@ -109,8 +109,8 @@ def ball_of_points(taxels, radius):
 
 @pytest.mark.parametrize("decoder", ["auto", "tv", "patches", "mixture"])
 def test_taxels_count_by_their_places(decoder):
-    """On a skin from points in any order a touch of several taxels is seen better where the skin is told than where only
-    the number of taxels is."""
+    """On a skin from points in any order a touch of several taxels is seen better where the skin is told than where
+    only the number of taxels is."""
     skin, ball = ball_of_points(150, 0.03), spts.Body.sphere(0.2)
     found = {"skin": [], "shape": []}
     for seed in range(20):

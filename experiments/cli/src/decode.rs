@@ -204,8 +204,8 @@ struct Training<'a> {
 }
 
 impl<'a> Training<'a> {
-    /// From the sessions of `set`, which have been realigned. When one of them cannot be scored, or they are of several layouts, nothing is
-    /// learned from any, and a note says why.
+    /// From the sessions of `set`, which have been realigned. When one of them cannot be scored, or they are of several
+    /// layouts, nothing is learned from any, and a note says why.
     fn new(set: &SessionSet, skin: Option<&'a Path>, seed: u64) -> Self {
         let source = Source::aligned(set.clone(), Alignment::default());
         if let (Err(error), None) = (&source, skin) {
