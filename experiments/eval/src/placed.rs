@@ -13,9 +13,10 @@ use std::sync::Arc;
 ///
 /// The taxels are halved across their longest axis again and again, and the grid with them; axes are those of the
 /// smallest rectangle round the skin, and the third. Then two cells are exchanged wherever it lowers Σ w d, d the
-/// distance on the grid, in cells, between a taxel and one of its eight nearest, and w the pitch over their distance on
-/// the skin, which counts three times where the normals are more than 90° apart. It ends when nothing is gained. This is
-/// the quadratic assignment problem by exchanges of two (R. E. Burkard, "Quadratic assignment problems", EJOR 15, 1984).
+/// distance on the grid, in cells, between a taxel and one of its eight nearest, and w the pitch over their distance
+/// on the skin, which counts three times where the normals are more than 90° apart. It ends when nothing is gained.
+/// This is the quadratic assignment problem by exchanges of two (R. E. Burkard, "Quadratic assignment problems",
+/// EJOR 15, 1984).
 ///
 /// ```
 /// use spts_eval::placed::Arrangement;
