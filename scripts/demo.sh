@@ -23,7 +23,7 @@ press="a first press, some seconds: the letter T on the skin, and what one wire 
 page="the report, three to six minutes on two cores: 17 objects pressed, a ball bounced, decoders learned and scored"
 [ -n "$recordings" ] && page="the report, six minutes or more on two cores: 17 objects and a ball, beside the recordings in $recordings"
 
-step 1 "$build" ./scripts/build.py --release --locked --workspace
+step 1 "$build" ./scripts/build.py --release --locked --package spts-cli
 step 2 "$press" ./target/release/spts simulate press/T --out "$first"
 echo "first picture: $first/decoded.png"
 step 3 "$page" ./target/release/spts reproduce --out "$report" ${recordings:+--recordings "$recordings"}
