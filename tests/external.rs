@@ -4,8 +4,10 @@
 mod programs;
 mod run;
 
+use crate::recordings::recordings;
 use programs::{hostile, lines};
 use run::{LIMIT_S, Run, SLACK_S};
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::sync::atomic::{AtomicUsize, Ordering};
 use std::thread::sleep;
@@ -13,11 +15,12 @@ use std::time::{Duration, Instant};
 
 #[test]
 fn hostile_programs_end_within_their_limit_and_leave_nothing() {
+    let Some(recordings) = recordings() else { return };
     let (table, next) = (hostile(), AtomicUsize::new(0));
     let work = || {
         let mut done = Vec::new();
         while let Some(program) = table.get(next.fetch_add(1, Ordering::Relaxed)) {
-            done.push(tried(program));
+            done.push(tried(&recordings, program));
         }
         done
     };
@@ -47,9 +50,9 @@ struct Tried {
     wrong: Option<String>,
 }
 
-fn tried((name, program, expected): &(&str, String, &str)) -> Tried {
+fn tried(recordings: &Path, (name, program, expected): &(&str, String, &str)) -> Tried {
     let run = Run::new();
-    let output = run.output(program);
+    let output = run.output(recordings, program);
     let took_s = run.since_start_s();
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     let errors: Vec<&str> = said.lines().filter(|l| l.starts_with("error: ")).collect();
@@ -64,6 +67,7 @@ fn tried((name, program, expected): &(&str, String, &str)) -> Tried {
 /// Programs that answer as they should: images, classes alone, and the image of the first class that the header has.
 #[test]
 fn good_programs_are_scored() {
+    let Some(recordings) = recordings() else { return };
     let learned = "head = json.loads(sys.stdin.readline())\nimages = head[\"learn\"][\"images\"]\n\
                    assert len(images) == len(head[\"learn\"][\"labels\"]) > 9 and len(images[0]) == 100\n\
                    good = json.dumps(dict(image=images[0]))";
@@ -74,7 +78,7 @@ fn good_programs_are_scored() {
         lines("", "say(good)", "").replacen("sys.stdin.readline()", learned, 1),
     ] {
         let run = Run::new();
-        let mut command = run.command(&program, 60.0);
+        let mut command = run.command(&recordings, &program, 60.0);
         let output = command.arg("--json").output().unwrap();
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(output.status.success(), "{program}: {said}");
@@ -89,12 +93,13 @@ fn good_programs_are_scored() {
 /// Three signals, while a program sleeps.
 #[test]
 fn signals_end_programs() {
+    let Some(recordings) = recordings() else { return };
     for (signal, number) in [("TERM", 15), ("INT", 2), ("HUP", 1)] {
         if signal == "HUP" && ignores_hangups() {
             continue;
         }
         let run = Run::new();
-        let mut command = run.command("trap '' TERM INT HUP; sleep 1000", 600.0);
+        let mut command = run.command(&recordings, "trap '' TERM INT HUP; sleep 1000", 600.0);
         let mut child = command.stderr(Stdio::null()).stdout(Stdio::null()).spawn().unwrap();
         run.wait_for_start();
         sleep(Duration::from_millis(200));
@@ -118,8 +123,9 @@ fn ignores_hangups() -> bool {
 /// A run that is killed ends its programs.
 #[test]
 fn a_killed_run_leaves_no_program() {
+    let Some(recordings) = recordings() else { return };
     let run = Run::new();
-    let mut command = run.command("trap '' TERM INT HUP; sleep 1000 & sleep 1000", 600.0);
+    let mut command = run.command(&recordings, "trap '' TERM INT HUP; sleep 1000 & sleep 1000", 600.0);
     let mut child = command.stderr(Stdio::null()).stdout(Stdio::null()).spawn().unwrap();
     run.wait_for_start();
     child.kill().unwrap();

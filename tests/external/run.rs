@@ -1,9 +1,8 @@
 //! A run of `spts score` with an external program, and the processes that it leaves behind.
 
-use crate::command::{SPTS, succeeds};
+use crate::command::SPTS;
 use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
-use std::sync::LazyLock;
 use std::thread::sleep;
 use std::time::{Duration, Instant, SystemTime, UNIX_EPOCH};
 
@@ -19,14 +18,6 @@ const START: Duration = Duration::from_secs(120);
 /// if another copy is ended while it writes.
 const STARTS: &str = "[ -e \"$STARTED\" ] || \
     { date +%s.%N > \"$STARTED.$$\"; mv \"$STARTED.$$\" \"$STARTED\"; }; ";
-
-/// A session of a few presses, which all runs score.
-static SESSION: LazyLock<PathBuf> = LazyLock::new(|| {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR"));
-    let presses = ["simulate", "press/brain", "--contact", "footprint", "--presses", "6", "--out", "brain"];
-    succeeds(folder, &presses);
-    folder.join("brain")
-});
 
 /// A run of `spts score` with one program, in a folder of its own.
 pub(super) struct Run {
@@ -47,13 +38,12 @@ impl Run {
         }
     }
 
-    pub(super) fn command(&self, program: &str, limit_s: f64) -> Command {
+    pub(super) fn command(&self, recordings: &Path, program: &str, limit_s: f64) -> Command {
         let (name, value) = self.marker.split_once('=').unwrap();
         let mut command = Command::new(SPTS);
         command
-            .arg("score")
-            .arg(&*SESSION)
-            .args(["--measurements", "100", "--no-ball", "--no-times", "--learn-from", "raster"])
+            .args(["score", recordings.to_str().unwrap(), "--measurements", "100"])
+            .args(["--object", "brain", "--no-ball", "--no-times", "--learn-from", "raster"])
             .args(["--external-timeout", &limit_s.to_string(), "--threads", "2"])
             .args(["--external", &format!("x={STARTS}{program}")])
             .env("STARTED", &self.started)
@@ -64,8 +54,8 @@ impl Run {
         command
     }
 
-    pub(super) fn output(&self, program: &str) -> Output {
-        self.command(program, LIMIT_S).output().unwrap()
+    pub(super) fn output(&self, recordings: &Path, program: &str) -> Output {
+        self.command(recordings, program, LIMIT_S).output().unwrap()
     }
 
     /// Waits until the program has begun.
