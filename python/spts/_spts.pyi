@@ -188,7 +188,12 @@ class Wire:
 @final
 class Decoder:
     def __new__(
-        cls, name: str, shape: tuple[int, int], images: _Floats | None = None, labels: NDArray[np.int64] | None = None
+        cls,
+        name: str,
+        shape: tuple[int, int],
+        images: _Floats | None = None,
+        labels: NDArray[np.int64] | None = None,
+        surface: tuple[ArrayLike, ArrayLike] | None = None,
     ) -> Decoder: ...
     def decode(self, phi: _Floats, y: _Floats) -> _Floats: ...
     def decode_all(self, phi: _Floats, y: _Floats) -> tuple[_Floats, NDArray[np.int64]]: ...
