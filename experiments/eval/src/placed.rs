@@ -43,6 +43,8 @@ const TURNS: u32 = 180;
 const TURN: f64 = std::f64::consts::PI / 360.0;
 /// By what the spread along its own axis counts more when rows or columns are halved.
 const OWN: f64 = 3.0;
+/// Largest coordinate, m, as of the sample points of a skin.
+const MOST_M: f64 = 1e3;
 /// Most rounds of exchanges; those of 2,048 taxels end after some twenty.
 const ROUNDS: usize = 50;
 
@@ -53,8 +55,8 @@ impl Arrangement {
     /// Arranges taxels at `places`, m, whose outward unit normals are `normals`.
     ///
     /// # Errors
-    /// [`Refusal`] without a taxel or with too many, for different numbers of places and normals, and for a number that
-    /// is not finite.
+    /// [`Refusal`] without a taxel or with too many, for different numbers of places and normals, and for a coordinate
+    /// outside [−1000, 1000].
     pub fn new(places: &[[f64; 3]], normals: &[[f64; 3]]) -> Result<Self, Refusal> {
         let (taxels, found) = (places.len(), normals.len());
         if taxels == 0 || taxels != found {
@@ -64,8 +66,9 @@ impl Arrangement {
             return Err(Refusal::range("taxels", taxels as f64, "[1, 16384]"));
         }
         for (what, numbers) in [("places", places), ("normals", normals)] {
-            if let Some(k) = numbers.iter().position(|v| !v.iter().all(|v| v.is_finite())) {
-                return Err(Refusal::new(format!("`{what}[{k}]` = {:?} is not finite", numbers[k])));
+            let within = |v: &f64| (-MOST_M..=MOST_M).contains(v);
+            if let Some(k) = numbers.iter().position(|v| !v.iter().all(within)) {
+                return Err(Refusal::new(format!("`{what}[{k}]` = {:?} is outside [-1000, 1000]", numbers[k])));
             }
         }
         let places: Vec<Vector3<f64>> = places.iter().map(|v| Vector3::from(*v)).collect();
@@ -124,8 +127,8 @@ fn along_axes(places: &[Vector3<f64>]) -> Vec<[f64; 3]> {
         ends.iter().map(|[least, most]| most - least).product::<f64>()
     };
     // of turns that are as good, the first
-    let smallest = |best: (f64, u32), step| if area(step) < best.0 { (area(step), step) } else { best };
-    let (_, best) = (0..TURNS).fold((f64::INFINITY, 0), smallest);
+    let areas = (0..TURNS).map(|step| (area(step), step));
+    let (_, best) = areas.fold((f64::INFINITY, 0), |best, this| if this.0 < best.0 { this } else { best });
     places.iter().map(turned(best)).collect()
 }
 
@@ -406,8 +409,7 @@ mod tests {
                 let found = Arrangement::new(&places, &vec![UP; places.len()]).unwrap();
                 let kept = kept(&found, &on_grid);
                 eprintln!("{rows} x {cols}, {seed}: {:?}, {kept:.3} kept", found.shape);
-                // at random it would be 0.06
-                assert!(kept > 0.95, "{rows} x {cols}: {kept}");
+                assert!(kept >= 1.0, "{rows} x {cols}: {kept}");
                 let mut cells = found.cells.to_vec();
                 cells.sort_unstable();
                 cells.dedup();
@@ -432,12 +434,13 @@ mod tests {
             assert_eq!(cells.len(), taxels);
         }
         let mut rng = ChaCha8Rng::seed_from_u64(2);
-        let places: Vec<[f64; 3]> = (0..300).map(|_| std::array::from_fn(|_| rng.random_range(-1e9..1e9))).collect();
+        let places: Vec<[f64; 3]> = (0..300).map(|_| std::array::from_fn(|_| rng.random_range(-1e3..1e3))).collect();
         assert_eq!(Arrangement::new(&places, &vec![UP; 300]), Arrangement::new(&places, &vec![UP; 300]));
         let refused = [
             Arrangement::new(&[], &[]),
             Arrangement::new(&[UP], &[UP, UP]),
             Arrangement::new(&[[f64::NAN, 0.0, 0.0]], &[UP]),
+            Arrangement::new(&[[0.0, 1e200, 0.0], UP], &[UP, UP]),
             Arrangement::new(&vec![UP; 1 + (1 << 14)], &vec![UP; 1 + (1 << 14)]),
         ];
         for refused in refused {
