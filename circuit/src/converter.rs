@@ -231,7 +231,19 @@ impl Converter {
 
     /// Whether this converter can have made `volts`: each of them is the voltage of one of its codes, or NaN.
     pub fn made(&self, volts: &[f64]) -> bool {
-        volts.iter().all(|v| v.is_nan() || self.code(*v).is_some())
+        let step_v = match self.0.scale {
+            CodeScale::StepV(step_v) => step_v,
+            CodeScale::Divider { reference_v, numerator, denominator } => {
+                reference_v * numerator / denominator / f64::from(self.0.max_code)
+            }
+        };
+        let zero_v = self.0.offset_v - self.subtracted_v();
+        volts.iter().all(|v| {
+            // nearly always the nearest code, which costs less than a search
+            #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "limited to the codes")]
+            let nearest = ((zero_v - v) / step_v).round().clamp(0.0, f64::from(self.0.max_code)) as u32;
+            v.is_nan() || self.volts(nearest).to_bits() == v.to_bits() || self.code(*v).is_some()
+        })
     }
 }
 

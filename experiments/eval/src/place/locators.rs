@@ -7,6 +7,8 @@ use spts_recon::localise::{Localiser, centre_of_mass};
 use spts_recon::metrics::SUPPORT_THRESHOLD;
 use spts_recon::recover::ReferenceOmp;
 use spts_recon::{MatrixView, Problem, Recover as _, Solution, Workspace};
+use std::borrow::Cow;
+use std::cell::OnceCell;
 
 /// What locators work with.
 pub(super) struct Tools {
@@ -14,6 +16,31 @@ pub(super) struct Tools {
     /// Dictionary at all places.
     pub(super) dictionary: Dictionary,
     pub(super) localiser: Localiser,
+}
+
+/// A contact's measurements, and what more than one locator makes of them.
+pub(super) struct Measured<'a> {
+    press: &'a Press,
+    /// Φ·D of all its rows, row-major.
+    operator: OnceCell<Vec<f64>>,
+}
+
+impl<'a> Measured<'a> {
+    pub(super) fn new(press: &'a Press) -> Self {
+        Self { press, operator: OnceCell::new() }
+    }
+
+    /// Φ·D for the dictionary of `tools`.
+    fn operator(&self, tools: &Tools) -> &[f64] {
+        self.operator.get_or_init(|| {
+            let mut operator = vec![0.0; self.press.len() * tools.dictionary.sums.len()];
+            // a contact with a lost measurement has zeros, and no window of it is located
+            if let Some(all) = self.press.window(0, self.press.len()) {
+                tools.dictionary.project(all.phi, all.signs, &mut operator);
+            }
+            operator
+        })
+    }
 }
 
 /// Tells the place (row, col) of one contact by a window, which begins with the measurement of the given number of the
@@ -26,7 +53,7 @@ pub(super) struct LocatorSpec {
     pub(super) name: &'static str,
     /// Label in figures and printed tables.
     label: &'static str,
-    pub(super) start: for<'a> fn(&'a Tools, &'a Press) -> Locate<'a>,
+    pub(super) start: for<'a> fn(&'a Tools, &'a Measured<'a>) -> Locate<'a>,
 }
 
 /// Label of the locator `name` in figures and printed tables; an unknown name is its own label.
@@ -45,8 +72,12 @@ pub(super) const LOCATORS: &[LocatorSpec] = &[
         label: "middle of the sheet",
         start: |tools, _| Box::new(|_, _| Some(middle(tools.shape))),
     },
-    LocatorSpec { name: "script_s5", label: "script, 5 atoms", start: |tools, press| pursuit(tools, press, true) },
-    LocatorSpec { name: "matched", label: "matched", start: |tools, press| pursuit(tools, press, false) },
+    LocatorSpec {
+        name: "script_s5",
+        label: "script, 5 atoms",
+        start: |tools, measured| pursuit(tools, measured, true),
+    },
+    LocatorSpec { name: "matched", label: "matched", start: |tools, measured| pursuit(tools, measured, false) },
     LocatorSpec { name: "blob", label: "blob evidence", start: blob },
     LocatorSpec {
         name: TAXEL,
@@ -61,16 +92,12 @@ pub(super) fn middle(shape: [usize; 2]) -> [f64; 2] {
 }
 
 /// The published pursuit on the dictionary at all places, as in the script or matched to the device.
-fn pursuit<'a>(tools: &'a Tools, press: &'a Press, script: bool) -> Locate<'a> {
+fn pursuit<'a>(tools: &'a Tools, measured: &'a Measured<'a>, script: bool) -> Locate<'a> {
     let dictionary = &tools.dictionary;
     let atoms = dictionary.sums.len();
-    let mut operator = vec![0.0; press.len() * atoms];
-    // a contact with a lost measurement has zeros, and no window of it is located
-    if let Some(all) = press.window(0, press.len()) {
-        dictionary.project(all.phi, all.signs, &mut operator);
-    }
+    let mut operator = Cow::Borrowed(measured.operator(tools));
     if script {
-        dictionary.to_unit_weights(&mut operator);
+        dictionary.to_unit_weights(operator.to_mut());
     }
     let (mut work, mut solution) = (Workspace::default(), Solution::default());
     let mut image = vec![0.0; dictionary.atoms.nrows()];
@@ -89,7 +116,8 @@ fn pursuit<'a>(tools: &'a Tools, press: &'a Press, script: bool) -> Locate<'a> {
 }
 
 /// The evidence of round blobs of all widths at all places.
-fn blob<'a>(tools: &'a Tools, press: &'a Press) -> Locate<'a> {
+fn blob<'a>(tools: &'a Tools, measured: &'a Measured<'a>) -> Locate<'a> {
+    let press = measured.press;
     let project = |row: &[f64]| {
         let mut projected = Vec::new();
         // rows of another size leave it empty, which no window accepts

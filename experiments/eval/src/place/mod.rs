@@ -10,7 +10,7 @@ pub use locators::locator_label;
 use crate::sensing::{Sensing, chosen_places};
 use crate::training::Dictionary;
 use crate::windows::Press;
-use locators::{LOCATORS, LocatorSpec, TAXEL, Tools, middle, taxel};
+use locators::{LOCATORS, LocatorSpec, Measured, TAXEL, Tools, middle, taxel};
 use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use spts_circuit::Recording;
@@ -193,8 +193,9 @@ impl<'a> PlacesRequest<'a> {
                     chosen_places(&press, tools.shape, most, *sensing == Sensing::WorstKind)?
                 }
             };
+            let measured: Vec<_> = presses.iter().map(Measured::new).collect();
             for spec in &self.locators {
-                let mut locators: Vec<_> = presses.iter().map(|press| (spec.start)(tools, press)).collect();
+                let mut locators: Vec<_> = measured.iter().map(|measured| (spec.start)(tools, measured)).collect();
                 for &m in self.measurements {
                     let mut errors = Vec::new();
                     for (press, locator) in presses.iter().zip(&mut locators) {
@@ -214,8 +215,8 @@ impl<'a> PlacesRequest<'a> {
     }
 }
 
-/// A contact as recorded and, relabelled, at every cyclic shift of the taxels that leaves its centre far enough from
-/// the edge: as recorded, all drops fall on the middle of the sheet, which a guess finds too.
+/// A contact as recorded and, relabelled, at cyclic shifts of the taxels that leave its centre far enough from the edge:
+/// as recorded, all drops fall on the middle of the sheet, which a guess finds too.
 fn views(contact: &Contact) -> Vec<(bool, &Contact, [usize; 2])> {
     let relabelled = contact.shifts().into_iter().map(|shift| (true, contact, shift));
     std::iter::once((false, contact, [0, 0])).chain(relabelled).collect()
@@ -223,6 +224,9 @@ fn views(contact: &Contact) -> Vec<(bool, &Contact, [usize; 2])> {
 
 /// A relabelled contact's centre keeps this distance from the outer taxels, taxels.
 const MARGIN_PX: f64 = 1.2;
+
+/// Of the shifts along an axis, every such one is tried: the measurements of them all are the same.
+const SHIFT_STEP: usize = 2;
 
 /// Measurements of a touch in which it is located: some hundred windows of the usual sizes.
 const TOUCH_MEASUREMENTS: usize = 2000;
@@ -257,15 +261,16 @@ impl Contact {
         [0, 1].map(|k| (self.centre[k] + shift[k] as f64) % self.shape[k] as f64)
     }
 
-    /// Shifts that leave the centre far enough from the edge.
+    /// Shifts that leave the centre far enough from the edge, every [`SHIFT_STEP`]th along an axis.
     fn shifts(&self) -> Vec<[usize; 2]> {
-        let all = (0..self.shape[0]).flat_map(|r| (0..self.shape[1]).map(move |c| [r, c]));
-        let inside = |k: usize, at: f64| (MARGIN_PX..=self.shape[k] as f64 - 1.0 - MARGIN_PX).contains(&at);
-        all.filter(|&s| {
-            let [r, c] = self.moved(s);
-            inside(0, r) && inside(1, c)
-        })
-        .collect()
+        let along = |k: usize| {
+            let inside = move |s: &usize| {
+                let at = (self.centre[k] + *s as f64) % self.shape[k] as f64;
+                (MARGIN_PX..=self.shape[k] as f64 - 1.0 - MARGIN_PX).contains(&at)
+            };
+            (0..self.shape[k]).filter(inside).step_by(SHIFT_STEP)
+        };
+        along(0).flat_map(|r| along(1).map(move |c| [r, c])).collect()
     }
 
     /// The contact with taxel (r, c) called (r + shift₀, c + shift₁), cyclically.

@@ -4,8 +4,9 @@ use super::statistics::{mean, robust_sd, sd};
 use super::windows::{OUTLIER_SD, Reseeded, TAPS, WINDOW_FRAMES, fit_windows};
 use nalgebra::{SMatrix, SVector};
 use serde::Serialize;
-use spts_circuit::{Recording, WeightMode};
+use spts_circuit::{Jump, Recording, WeightMode};
 use spts_models::SkinLayout;
+use spts_recon::{MatrixView, SignTables};
 use std::ops::Range;
 
 /// Correlation of the residual with a foreign sequence, in standard errors, that is believed. The memory of the taxels'
@@ -16,7 +17,7 @@ const BELIEVED_SHARE: f64 = 0.05;
 /// Largest seed: the master sends one byte.
 const SEEDS: u32 = 256;
 /// Largest lag that is looked for, measurements.
-const LAGS: u64 = 100;
+const LAGS: usize = 100;
 
 /// A sequence in the output that no cell should produce.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
@@ -85,20 +86,21 @@ pub(super) fn find(
     let weights = recording.weights();
     let n = core.len() as f64;
     let believed = |sum: f64| sum.abs() > BELIEVED_SE * power.sqrt() && sum.abs() / n > BELIEVED_SHARE * norm_v;
-    let correlate = |seed: u32, row: u64| -> f64 {
-        let mut state = spts_circuit::Jump::new(row + 1).apply(seed);
-        let mut sum = 0.0;
-        for r in &core {
-            sum += if state >> 31 == 1 { *r } else { -r };
-            state = spts_circuit::Jump::ONE.apply(state);
-        }
-        sum
+    // sums of ± the residuals, by look-up
+    let Ok(column) = MatrixView::new(core.len(), 1, &core) else {
+        return Vec::new();
+    };
+    let sums = SignTables::<f64>::new(column);
+    let correlate = |signs: &[u64]| -> f64 {
+        let mut sum = [0.0];
+        sums.fill_rows(signs, &mut sum);
+        sum[0]
     };
     let taxels = u32::try_from(recording.taxels()).unwrap_or(u32::MAX);
     let own: Vec<u32> = (0..recording.taxels()).filter_map(|taxel| weights.seed(taxel)).collect();
     let (mut faults, mut taken) = (Vec::new(), Vec::new());
     for seed in (0..SEEDS).filter(|seed| !own.contains(seed)) {
-        let sum = correlate(seed, first_row);
+        let sum = correlate(&signs(seed, first_row, core.len()));
         if believed(sum) {
             let taxel = raster.and_then(|r| missing(&window.image, r, &taken));
             taken.extend(taxel);
@@ -109,15 +111,37 @@ pub(super) fn find(
         let Some(seed) = weights.seed(taxel as usize) else {
             continue;
         };
+        let most = usize::try_from(first_row).map_or(LAGS, |row| row.min(LAGS));
+        let all = signs(seed, first_row - most as u64, core.len() + most);
         // lags of 1, 2 and 3 are the memory's
-        for lag in (TAPS as u64 + 1..=LAGS).filter(|lag| *lag <= first_row) {
-            let sum = correlate(seed, first_row - lag);
+        for lag in TAPS + 1..=most {
+            let sum = correlate(&later(&all, most - lag, core.len()));
             if believed(sum) {
-                faults.push(CellFault::Lagging { taxel, lag, amplitude_v: sum / n });
+                faults.push(CellFault::Lagging { taxel, lag: lag as u64, amplitude_v: sum / n });
             }
         }
     }
     faults
+}
+
+/// Signs of the sequence of `seed` at `len` rows from `row` on, one bit each, set for +1.
+fn signs(seed: u32, row: u64, len: usize) -> Vec<u64> {
+    let mut state = Jump::new(row + 1).apply(seed);
+    let mut signs = vec![0; len.div_ceil(64)];
+    for i in 0..len {
+        signs[i / 64] |= u64::from(state >> 31) << (i % 64);
+        state = Jump::ONE.apply(state);
+    }
+    signs
+}
+
+/// `len` bits of `signs` from bit `start` on.
+fn later(signs: &[u64], start: usize, len: usize) -> Vec<u64> {
+    let word = |i: usize| signs.get(i).copied().unwrap_or(0);
+    let shift = start % 64;
+    // a shift by 64 would be one by 0
+    let joined = |i: usize| word(i) >> shift | (word(i + 1) << 1) << (63 - shift);
+    (start / 64..).map(joined).take(len.div_ceil(64)).collect()
 }
 
 /// A taxel is touched when it has this share of the raster session's largest: ten times the noise of a mean over its

@@ -141,9 +141,8 @@ impl Late {
         let outliers: Vec<usize> = inside.clone().filter(|i| residual_v[*i].abs() > limit).collect();
         let seen: Vec<f64> = window.image.iter().map(|x| seen(2.0 * x / self.core_v)).collect();
         for (k, seen) in seen.iter().enumerate().filter(|(_, seen)| **seen > UNSEEN) {
-            let flips = inside.clone().filter(|i| full(window, k, *i).is_some()).count();
-            let flips = flips as f64;
-            self.counts[k].flips += seen * flips;
+            let flips = window.design.flips(k, TAPS + inside.start..TAPS + inside.end);
+            self.counts[k].flips += seen * flips as f64;
         }
         let cells: Vec<usize> = (0..seen.len()).filter(|k| seen[*k] > UNSEEN).collect();
         for &i in &outliers {

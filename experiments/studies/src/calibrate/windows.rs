@@ -113,9 +113,15 @@ impl Design {
         let mut columns = vec![0_u64; words * count];
         let row_words = taxels.div_ceil(64).max(1);
         let rows = weights.sign_bits()?;
-        for (i, row) in rows.chunks_exact(row_words).enumerate() {
-            for k in 0..taxels {
-                columns[k * words + i / 64] |= (row[k / 64] >> (k % 64) & 1) << (i % 64);
+        for (at, rows) in rows.chunks(64 * row_words).enumerate() {
+            for word in 0..row_words {
+                let mut block = [0; 64];
+                let of_rows = rows.chunks_exact(row_words).map(|row| row[word]);
+                block.iter_mut().zip(of_rows).for_each(|(bits, row)| *bits = row);
+                transpose(&mut block);
+                for (k, bits) in (64 * word..taxels).zip(block) {
+                    columns[k * words + at] = bits;
+                }
             }
         }
         let mut design = Self { len, words, columns, count };
@@ -145,6 +151,20 @@ impl Design {
     #[inline]
     pub(super) fn is_plus(&self, k: usize, i: usize) -> bool {
         self.columns[k * self.words + i / 64] >> (i % 64) & 1 == 1
+    }
+
+    /// Number of measurements in `range` at which the weight of taxel `k` differs from the one before.
+    pub(super) fn flips(&self, k: usize, range: Range<usize>) -> u32 {
+        let (column, mut count, mut i) = (self.column(k), 0, range.start);
+        while i < range.end {
+            // those of a word together
+            let (word, first) = (column[i / 64], i % 64);
+            let before = if first == 0 { word << 1 | column[i / 64 - 1] >> 63 } else { word << 1 };
+            let len = (64 - first).min(range.end - i);
+            count += ((word ^ before) >> first & (!0 >> (64 - len))).count_ones();
+            i += len;
+        }
+        count
     }
 
     /// Σₖ coefficientsₖ·columnₖ; fewer coefficients than columns leave the last columns out.
@@ -189,6 +209,20 @@ impl Design {
             }
         }
         sum
+    }
+}
+
+/// Transposes a square of bits: bit i of word k becomes bit k of word i (H. S. Warren, Hacker's Delight, 7-3).
+fn transpose(bits: &mut [u64; 64]) {
+    let (mut half, mut mask) = (32, u64::MAX >> 32);
+    while half > 0 {
+        for k in (0..64).filter(|k| k & half == 0) {
+            let swapped = (bits[k] >> half ^ bits[k + half]) & mask;
+            bits[k] ^= swapped << half;
+            bits[k + half] ^= swapped;
+        }
+        half /= 2;
+        mask ^= mask << half;
     }
 }
 
@@ -266,6 +300,10 @@ mod tests {
             assert_eq!(design.is_plus(k, i), weights.level(u32::try_from(k).unwrap(), 12_345 + i as u64) > 0.0);
         }
         assert_eq!(design.is_plus(7, 5), WeightMode::Binary.level_from_seed(2, 12_350) > 0.0);
+        for range in [1..1000, 20..64, 64..129, 77..78, 90..90] {
+            let flips = range.clone().filter(|i| design.is_plus(3, *i) != design.is_plus(3, i - 1)).count();
+            assert_eq!(design.flips(3, range) as usize, flips);
+        }
     }
 
     #[test]
