@@ -18,15 +18,18 @@ PREFIX ?= $(HOME)/.local
 install: setup
 	./scripts/install.sh "$(PREFIX)"
 
+# maturin builds the Python package, and sets what a build depends on
+ALL = --release --locked --workspace --exclude spts-python
+
 test: setup
-	cargo test --release --locked --workspace
+	cargo test $(ALL)
 
 # The slow tests, which `make test` leaves out, some minutes: ngspice's speed, MuJoCo's finite elements, a million edges
 # of a hundred cells, the processor against yasimavr, and with recordings the score curves of twin and skin. Without
 # recordings, ngspice or yasimavr, what needs them says so and is skipped. ONLY="NAME..." runs those tests alone.
 ONLY ?=
 validate: setup
-	cargo test --release --locked --workspace --lib --bins --tests -- --ignored $(ONLY)
+	cargo test $(ALL) --lib --bins --tests -- --ignored $(ONLY)
 
 # Data sets, read with the programs that people read them with (pyarrow, DuckDB, polars, pandas, Hugging Face
 # `datasets`, Croissant), and made by many workers, Ray among them. A minute or two; the first time, and after a change
@@ -36,7 +39,7 @@ READERS ?= out/readers
 PARALLEL = --numprocesses logical --dist loadfile
 readers: setup
 	./scripts/environment.sh "$(READERS)" scripts/dataset/requirements.txt
-	cargo build --release --locked --quiet --workspace
+	cargo build $(ALL) --quiet
 	"$(READERS)/bin/python" -m pytest $(PARALLEL) --quiet --tb=short -rs --disable-warnings -p no:cacheprovider scripts/dataset
 
 # The wheel of the Python package `spts` for this machine, in out/wheels: two minutes after `make demo`.
@@ -79,7 +82,7 @@ BOOK ?= out/mkdocs
 BLOCKS ?=
 book: setup
 	./scripts/environment.sh "$(BOOK)" scripts/docs/requirements.txt
-	cargo build --release --locked --quiet --workspace
+	cargo build $(ALL) --quiet
 	python3 scripts/docs/links.py
 	NO_MKDOCS_2_WARNING=1 "$(BOOK)/bin/mkdocs" build --strict
 	$(if $(wildcard $(PYTHON)/bin/python),"$(PYTHON)/bin/python" scripts/docs/run_blocks.py,"$(BOOK)/bin/python" scripts/docs/run_blocks.py --without python) $(BLOCKS)
@@ -91,7 +94,7 @@ SHOTS ?=
 browser: setup
 	./scripts/setup.sh chromium
 	./scripts/environment.sh "$(BROWSER)" scripts/browser/requirements.txt
-	cargo build --release --locked --quiet --workspace
+	cargo build $(ALL) --quiet
 	test -n "$$SPTS_REPORT" || target/release/spts reproduce --quick --out "$(BROWSER)/report" >/dev/null
 	SPTS_REPORT="$${SPTS_REPORT:-$(BROWSER)/report}" "$(BROWSER)/bin/python" -m pytest $(PARALLEL) --quiet --tb=short -rs -p no:cacheprovider scripts/browser $(if $(SHOTS),--shots "$(SHOTS)")
 

@@ -6,8 +6,8 @@ cd "$(dirname "$0")"
 python=${PYTHON:-python3}
 out=../out/examples
 
-# with all of the workspace, whose features and so whose parts are then those of the tests
-cargo build --locked --release --quiet --workspace
+# with all of the workspace that the tests need
+cargo build --locked --release --quiet --workspace --exclude spts-python
 mkdir -p "$out"
 programs=$PWD/../target/release
 run() { printf '\n-- %s\n' "$*"; "$programs/$@"; }

@@ -20,10 +20,9 @@ def macro(package):
     return any("proc-macro" in target["kind"] for target in package["targets"])
 
 
-def crates(manifest, root, target):
-    """The packages that the package `root` of the workspace of `manifest` links on `target`, by name and version."""
-    command = ["cargo", "metadata", "--locked", "--format-version", "1", "--manifest-path", manifest]
-    command += ["--filter-platform", target]
+def crates(root, target):
+    """The packages that the package `root` links on `target`, by name and version."""
+    command = ["cargo", "metadata", "--locked", "--format-version", "1", "--filter-platform", target]
     found = json.loads(subprocess.run(command, check=True, stdout=subprocess.PIPE, text=True).stdout)
     packages = {package["id"]: package for package in found["packages"]}
     nodes = {node["id"]: node for node in found["resolve"]["nodes"]}
@@ -40,7 +39,7 @@ def crates(manifest, root, target):
 def main():
     linked = {}
     for target in sys.argv[1:]:
-        linked |= crates("Cargo.toml", "spts-cli", target) | crates("python/Cargo.toml", "spts-python", target)
+        linked |= crates("spts-cli", target) | crates("spts-python", target)
     table = csv.writer(sys.stdout, lineterminator="\n")
     table.writerow(["crate", "version", "licence", "source"])
     table.writerow(FONT)

@@ -1,7 +1,6 @@
 //! What the library draws in: a robot's program needs no command line and no pictures, and contact no physics engine.
 
-use std::collections::{BTreeMap, BTreeSet};
-use std::path::Path;
+use std::collections::BTreeSet;
 use std::process::Command;
 
 /// Names of the packages that `package` is built from, tests aside.
@@ -36,25 +35,4 @@ fn the_library_is_free_of_what_its_users_do_not_need() {
     }
     // the names are right: the library has the engine
     assert!(packages("spts").contains("mujoco-rs"));
-}
-
-/// The Python package is built beside the workspace: with other versions it would be built from nothing, and of other
-/// parts than what the tests have seen. What the workspace does not need is left out.
-#[test]
-fn the_python_package_has_the_versions_of_the_workspace() {
-    let locked = |file: &str| -> BTreeMap<String, BTreeSet<String>> {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join(file);
-        let lock: toml::Table = toml::from_str(&std::fs::read_to_string(path).unwrap()).unwrap();
-        let mut versions: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
-        for package in lock["package"].as_array().unwrap() {
-            let text = |key: &str| package[key].as_str().unwrap().to_owned();
-            versions.entry(text("name")).or_default().insert(text("version"));
-        }
-        versions
-    };
-    let (python, workspace) = (locked("../python/Cargo.lock"), locked("../Cargo.lock"));
-    for (name, versions) in &python {
-        let Some(known) = workspace.get(name) else { continue };
-        assert!(versions.is_subset(known), "{name}: {versions:?} in python/Cargo.lock, {known:?} in Cargo.lock");
-    }
 }

@@ -157,7 +157,6 @@ fn every_path_of_the_architecture_exists() {
 fn the_version_is_everywhere_the_same() {
     let version = env!("CARGO_PKG_VERSION");
     for (file, line) in [
-        ("python/Cargo.toml", format!("version = \"{version}\"")),
         ("fuzz/Cargo.toml", format!("version = \"{version}\"")),
         ("python/spts/__init__.py", format!("__version__ = \"{version}\"")),
         ("CITATION.cff", format!("version: {version}")),

@@ -99,7 +99,8 @@ fn press_tells_nothing(rows: Option<&Patterns>) {
         pattern.extend(["--set", "rows.kind=pattern", "--set", "rows.patterns_file=rows.txt"]);
     }
     for weights in ["model", "firmware"] {
-        let arguments = ["simulate", "press/T", "--seed", "3", "--weights", weights, "--out", weights];
+        let arguments =
+            ["simulate", "press/T", "--presses", "3", "--seed", "3", "--weights", weights, "--out", weights];
         succeeds(dir.path(), &[&arguments[..], &pattern].concat());
     }
     let (model, firmware) = (files(&dir.path().join("model")), files(&dir.path().join("firmware")));

@@ -165,7 +165,7 @@ fn drops_on_several_wires_have_places() {
         );
         std::fs::write(here.join("press.toml"), press).unwrap();
         succeeds(here, &["simulate", "press.toml", "--out", "all/press"]);
-        succeeds(here, &["score", "all", "--measurements", "60", "--no-times", "--out", "c"]);
+        succeeds(here, &["score", "all", "--decoder", "nn_lmmse", "--measurements", "60", "--no-times", "--out", "c"]);
         std::fs::remove_dir_all(here.join("all")).unwrap();
     }
 }

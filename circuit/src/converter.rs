@@ -239,10 +239,11 @@ impl Converter {
         };
         let zero_v = self.0.offset_v - self.subtracted_v();
         volts.iter().all(|v| {
-            // nearly always the nearest code, which costs less than a search
+            // nearly always the nearest code, or of a voltage set to 0 the next one, which cost less than a search
             #[expect(clippy::cast_possible_truncation, clippy::cast_sign_loss, reason = "limited to the codes")]
             let nearest = ((zero_v - v) / step_v).round().clamp(0.0, f64::from(self.0.max_code)) as u32;
-            v.is_nan() || self.volts(nearest).to_bits() == v.to_bits() || self.code(*v).is_some()
+            let is = |code: u32| code <= self.0.max_code && self.volts(code).to_bits() == v.to_bits();
+            v.is_nan() || is(nearest) || is(nearest + 1) || self.code(*v).is_some()
         })
     }
 }

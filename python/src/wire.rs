@@ -221,6 +221,7 @@ impl Wire {
     /// phi : ndarray (M, taxels)
     ///     The rows of the sensing matrix Φ: the weights of the cells at each measurement.
     #[pyo3(signature = (touch, measurements = None, *, raster = false, raw = false, weights = true, dt = None))]
+    #[expect(clippy::too_many_arguments, reason = "keywords of Python")]
     fn record<'py>(
         &self,
         py: Python<'py>,

@@ -481,7 +481,7 @@ def test_any_number_of_skins_in_any_order():
     for touch in touches[::2] + touches[1::2]:
         touch.detach()
     assert mujoco.get_mjcb_control() is None
-    for _ in range(100):
+    for _ in range(30):
         # an episode each
         spts.mujoco.attach(model, data, spts.Skin(4, 4, 0.01), body="l0", bodies=["cup"], mode="foam").step()
 
@@ -802,7 +802,7 @@ def test_threads_do_not_change_what_is_felt(dog, mode):
         data = mujoco.MjData(model)
         robot = spts.mujoco.dress(model, data, pitch=0.02, wires="limb", mode=mode, seed=seed)
         data.qvel[0] = 0.1 * seed
-        robot.step(150)
+        robot.step(50)
         found = [t.pressure for t in robot.touches] + [y for y, _ in robot.record(30, weights=False)]
         robot.detach()
         return b"".join(part.tobytes() for part in found)

@@ -279,7 +279,7 @@ def test_an_estimator_that_fails_is_said(sessions):
 
 def test_making_can_be_interrupted(tmp_path):
     """Ctrl-C ends it with KeyboardInterrupt, and the same call goes on: the digest is that of one go."""
-    call = f"import spts; spts.dataset.make('random-shapes', {str(tmp_path / 'a')!r}, rows=60000, set={{'rows_per_shard': 500}}, workers=1)"
+    call = f"import spts; spts.dataset.make('random-shapes', {str(tmp_path / 'a')!r}, rows=12000, set={{'rows_per_shard': 100}}, workers=1)"
     run = subprocess.Popen([sys.executable, "-c", call], stderr=subprocess.PIPE, text=True)
     while not list(tmp_path.glob("a/data/*.parquet")):
         time.sleep(0.01)
@@ -287,7 +287,7 @@ def test_making_can_be_interrupted(tmp_path):
     assert "KeyboardInterrupt" in run.communicate(timeout=60)[1] and run.returncode != 0
     made = len(list(tmp_path.glob("a/data/*.parquet")))
     assert 0 < made < 120
-    data = spts.dataset.make("random-shapes", tmp_path / "a", rows=60000, set={"rows_per_shard": 500})
+    data = spts.dataset.make("random-shapes", tmp_path / "a", rows=12000, set={"rows_per_shard": 100})
     assert data.info["made"] == 120
 
 

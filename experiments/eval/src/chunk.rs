@@ -2,8 +2,9 @@
 
 use crate::windows::{compressive_wires, wire_means};
 use spts_circuit::{Recording, WeightRows};
-use spts_recon::MatrixView;
+use spts_recon::operator::SignRows;
 use spts_recon::recover::LeastSquares;
+use spts_recon::{LinearOperator as _, MatrixView, SignTables};
 
 /// Steps of the conjugate gradients. L rows of N = L/4 random signs have a condition number of 9, so that a step halves
 /// the error.
@@ -132,29 +133,33 @@ impl<'a> Chunk<'a> {
     pub(crate) fn fit(&self, rows: i64) -> Option<Fit> {
         let (taxels, wires) = (self.recording.taxels(), compressive_wires(self.recording));
         let rows_of = self.rows(rows, 0)?;
-        let mut phi = rows_of.to_vec();
         if self.energy <= 0.0 {
             return None;
         }
-        for (row, _) in phi.chunks_exact_mut(taxels).zip(&self.lost).filter(|(_, lost)| **lost) {
-            row.fill(0.0);
-        }
-        let weight = |lost: &bool| if *lost { 0.0 } else { 1.0 };
+        // weights of ±1 on one wire are kept as bits, a 64th of the memory
+        let bits = rows_of.sign_bits().filter(|_| wires == 1);
+        let phi = if bits.is_some() { Vec::new() } else { rows_of.to_vec() };
+        let numbers = MatrixView::new(phi.len() / taxels.max(1), taxels, &phi).ok()?;
+        let kept = |i: usize| if self.lost[i] { 0.0 } else { 1.0 };
         // after the taxels, an image has the constant of every wire
         let constant: Vec<usize> = (0..self.y.len()).map(|i| taxels + rows_of.wire(i)).collect();
         let apply = |image: &[f64], out: &mut [f64]| {
-            let rows = phi.chunks_exact(taxels).zip(&constant);
-            for ((out, (row, constant)), lost) in out.iter_mut().zip(rows).zip(&self.lost) {
-                *out = dot(row, image) + weight(lost) * image[*constant];
+            let of_taxels = &image[..taxels];
+            match (&bits, MatrixView::new(taxels, 1, of_taxels)) {
+                (Some(bits), Ok(column)) => SignTables::<f64>::new(column).fill_rows(bits, out),
+                _ => numbers.apply(of_taxels, out),
             }
+            out.iter_mut().enumerate().for_each(|(i, out)| *out = kept(i) * (*out + image[constant[i]]));
         };
+        // `y` has zeros for lost samples, as all that `apply` gives
         let adjoint = |y: &[f64], out: &mut [f64]| {
-            out.fill(0.0);
-            let rows = phi.chunks_exact(taxels).zip(&constant);
-            for ((y, (row, constant)), lost) in y.iter().zip(rows).zip(&self.lost) {
-                out.iter_mut().zip(row).for_each(|(out, w)| *out += w * y);
-                out[*constant] += weight(lost) * y;
+            let (of_taxels, constants) = out.split_at_mut(taxels);
+            match &bits {
+                Some(bits) => SignRows::new(bits, taxels).apply_adjoint(y, of_taxels),
+                None => numbers.apply_adjoint(y, of_taxels),
             }
+            constants.fill(0.0);
+            y.iter().zip(&constant).for_each(|(y, constant)| constants[constant - taxels] += y);
         };
         let mut image = vec![0.0; taxels + wires];
         let mut left = self.y.clone();

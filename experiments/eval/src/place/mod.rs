@@ -215,8 +215,8 @@ impl<'a> PlacesRequest<'a> {
     }
 }
 
-/// A contact as recorded and, relabelled, at cyclic shifts of the taxels that leave its centre far enough from the edge:
-/// as recorded, all drops fall on the middle of the sheet, which a guess finds too.
+/// A contact as recorded and, relabelled, at cyclic shifts of the taxels that leave its centre far enough from the
+/// edge: as recorded, all drops fall on the middle of the sheet, which a guess finds too.
 fn views(contact: &Contact) -> Vec<(bool, &Contact, [usize; 2])> {
     let relabelled = contact.shifts().into_iter().map(|shift| (true, contact, shift));
     std::iter::once((false, contact, [0, 0])).chain(relabelled).collect()
