@@ -100,7 +100,7 @@ fn press_tells_nothing(rows: Option<&Patterns>) {
     }
     for weights in ["model", "firmware"] {
         let arguments =
-            ["simulate", "press/T", "--presses", "3", "--seed", "3", "--weights", weights, "--out", weights];
+            ["simulate", "press/T", "--presses", "1", "--seed", "3", "--weights", weights, "--out", weights];
         succeeds(dir.path(), &[&arguments[..], &pattern].concat());
     }
     let (model, firmware) = (files(&dir.path().join("model")), files(&dir.path().join("firmware")));

@@ -155,7 +155,7 @@ fn drops_on_several_wires_have_places() {
     let here = dir.path();
     for (side, pitch_m) in [(10, 0.015), (50, 0.003)] {
         let scene = format!(
-            "[[wires]]\nbands = 2\n[skin]\nrows = {side}\ncols = {side}\npitch_m = {pitch_m}\n[drop]\ndrops = 2\n"
+            "[[wires]]\nbands = 2\n[skin]\nrows = {side}\ncols = {side}\npitch_m = {pitch_m}\n[drop]\ndrops = 1\n"
         );
         std::fs::write(here.join("drop.toml"), scene).unwrap();
         succeeds(here, &["simulate", "drop.toml", "--out", "all/drop"]);
@@ -165,7 +165,7 @@ fn drops_on_several_wires_have_places() {
         );
         std::fs::write(here.join("press.toml"), press).unwrap();
         succeeds(here, &["simulate", "press.toml", "--out", "all/press"]);
-        succeeds(here, &["score", "all", "--decoder", "nn_lmmse", "--measurements", "60", "--no-times", "--out", "c"]);
+        succeeds(here, &["score", "all", "--decoder", "patches", "--measurements", "60", "--no-times", "--out", "c"]);
         std::fs::remove_dir_all(here.join("all")).unwrap();
     }
 }
