@@ -8,3 +8,5 @@ if ! [ -d "$(rustc --print sysroot)/lib/rustlib/$1/lib" ] && ! rustup target add
     exit 1
   fi
 fi
+# messages name files as here, not as on the machine that builds
+export RUSTFLAGS="--remap-path-prefix=$PWD=. --remap-path-prefix=${CARGO_HOME:-$HOME/.cargo}/registry/src=crates"

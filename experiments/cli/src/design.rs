@@ -2,7 +2,7 @@
 
 use crate::context::{Bars, Common, open_folder};
 use crate::error::CliError;
-use crate::options::{length, seed, whole, with_unit, within};
+use crate::options::{LENGTHS, length, seed, whole, with_unit, within};
 use clap::{Args, Subcommand};
 use spts_report::design::{read_design, write};
 use spts_studies::design::{DesignObjects, DesignStudy, WireChoice};
@@ -14,6 +14,9 @@ use std::path::PathBuf;
 /// The answer is simulated: touches of other specimens go through the design's own circuit (amplifier and converter of
 /// the profile as_designed, with the contact noise, late updates and idle noise of the recordings), and are decoded and
 /// scored. `spts design check DIR` checks the promise with touches that the design has not seen. See docs/design.md.
+///
+/// Where no skin reaches the IoU, the answer is the best there is, under the heading NOT REACHABLE (--json: `reached`),
+/// and the exit status is 0 as well.
 #[derive(Debug, Args)]
 #[command(
     args_conflicts_with_subcommands = true,
@@ -56,7 +59,7 @@ enum DesignAction {
 /// A design that is asked for.
 #[derive(Debug, Args)]
 struct NewDesign {
-    /// Width and height of the sheet, m; each [0.001, 10]
+    /// Width and height of the sheet, as 30cmx20cm or, in metres, 0.3x0.2; each [0.001, 10] m
     #[arg(long, value_name = "WxH", value_parser = area, required = true)]
     area: Option<[f64; 2]>,
     /// Distance of neighbouring taxels, as 5mm, 0.5cm or, in metres, 0.005; [0.0001, 1] m. Each side of the area,
@@ -113,7 +116,7 @@ struct CheckCommand {
 
 /// Width and height, m.
 fn area(text: &str) -> Result<[f64; 2], String> {
-    let side = |word: &str| word.trim().parse().ok().filter(|m| (1e-3..=10.0).contains(m));
+    let side = |word: &str| with_unit(word.trim(), &LENGTHS).filter(|m| (1e-3..=10.0).contains(m));
     let found = text.split_once(['x', '×']).and_then(|(width, height)| Some([side(width)?, side(height)?]));
     found.ok_or_else(|| "is not WIDTHxHEIGHT with both in [0.001, 10] m".to_owned())
 }
@@ -196,7 +199,9 @@ mod tests {
         for wrong in ["", "mm", "nan", "-5mm", "0", "inf", "2m", "5 apples"] {
             assert!(length(wrong).is_err() && time(&wrong.replace("2m", "20s")).is_err(), "{wrong}");
         }
-        assert!(area("0.3x0.2").is_ok_and(|a| (a[0] - 0.3).abs() + (a[1] - 0.2).abs() < 1e-15));
+        for right in ["0.3x0.2", "30cmx20cm", "300mm × 0.2m"] {
+            assert!(area(right).is_ok_and(|a| (a[0] - 0.3).abs() + (a[1] - 0.2).abs() < 1e-12), "{right}");
+        }
         for wrong in ["0.3", "0x0.2", "nanx1", "0.3x", "11x1", "0.3x0.2x0.1"] {
             assert!(area(wrong).is_err(), "{wrong}");
         }

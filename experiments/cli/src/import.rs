@@ -2,7 +2,7 @@
 
 use crate::context::{Common, notes, open_folder};
 use crate::error::CliError;
-use crate::options::{length, whole, within};
+use crate::options::{length, whole, with_unit};
 use clap::Args;
 use serde::Serialize;
 use spts::data::{FrameArray, FrameOptions, Frames};
@@ -39,8 +39,8 @@ pub(super) struct ImportCommand {
     /// Distance of neighbouring taxels, as 5mm or, in metres, 0.005; [0.0001, 1] m [default: 15mm, said in a note]
     #[arg(long, value_name = "LENGTH", value_parser = length)]
     pitch: Option<f64>,
-    /// Frames a second; [0.001, 1000000] Hz [default: that of the file's times]
-    #[arg(long, value_name = "HZ", value_parser = within(1e-3, 1e6, "[0.001, 1000000]"))]
+    /// Frames a second, as 100 or 100Hz; [0.001, 1000000] Hz [default: that of the file's times]
+    #[arg(long, value_name = "HZ", value_parser = rate)]
     rate: Option<f64>,
     /// What the values are: pressure in Pa, conductance in S, codes of a converter, or relative ones; all grow with the
     /// load
@@ -84,6 +84,12 @@ fn unit(text: &str) -> Result<FrameUnit, String> {
         let names = FrameUnit::ALL.map(|(name, _)| name).join(", ");
         format!("is not one of {names}")
     })
+}
+
+/// A rate, Hz.
+fn rate(text: &str) -> Result<f64, String> {
+    let found = with_unit(text, &[("kHz", 1e3), ("Hz", 1.0)]);
+    found.filter(|hz| (1e-3..=1e6).contains(hz)).ok_or_else(|| "is outside [0.001, 1000000] Hz".to_owned())
 }
 
 fn idle(text: &str) -> Result<usize, String> {

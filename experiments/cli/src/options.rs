@@ -39,9 +39,12 @@ pub(super) fn with_unit(text: &str, units: &[(&str, f64)]) -> Option<f64> {
     text.parse().ok()
 }
 
+/// Units of a length, m.
+pub(super) const LENGTHS: [(&str, f64); 5] = [("mm", 1e-3), ("cm", 1e-2), ("um", 1e-6), ("µm", 1e-6), ("m", 1.0)];
+
 /// Parser of a length, m.
 pub(super) fn length(text: &str) -> Result<f64, String> {
-    let found = with_unit(text, &[("mm", 1e-3), ("cm", 1e-2), ("um", 1e-6), ("µm", 1e-6), ("m", 1.0)]);
+    let found = with_unit(text, &LENGTHS);
     let range = found.filter(|m| (1e-4..=1.0).contains(m));
     range.ok_or_else(|| "is not a length in [0.1mm, 1m], as 5mm or 0.005".to_owned())
 }
