@@ -225,7 +225,8 @@ fn views(contact: &Contact) -> Vec<(bool, &Contact, [usize; 2])> {
 /// A relabelled contact's centre keeps this distance from the outer taxels, taxels.
 const MARGIN_PX: f64 = 1.2;
 
-/// Of the shifts along an axis, every such one is tried: the measurements of them all are the same.
+/// Distance of neighbouring shifts along an axis, taxels. All shifts see the same measurements, so that those between
+/// tell little more.
 const SHIFT_STEP: usize = 2;
 
 /// Measurements of a touch in which it is located: some hundred windows of the usual sizes.
