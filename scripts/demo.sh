@@ -20,7 +20,7 @@ step() {
 since="what has changed since the last time"
 twin="building the twin: about four minutes on two cores the first time"
 [ -x target/release/press ] && twin="building the twin: $since"
-rest="building the command line: another four minutes the first time"
+rest="building the command line: another four to five minutes the first time"
 [ -x target/release/spts ] && rest="building the command line: $since"
 page="the report, three to six minutes on two cores: 17 objects pressed, a ball bounced, decoders learned and scored"
 [ -n "$recordings" ] && page="the report, six minutes or more on two cores: 17 objects and a ball, beside the recordings in $recordings"
