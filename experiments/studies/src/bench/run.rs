@@ -469,8 +469,8 @@ mod tests {
     }
 
     /// The touches of a release stay what they are, and so do the scores that points are counted from; the touches of
-    /// other splits are others. Ceilings are made for skins of up to so many taxels: `most_quick` with `--quick`, `most`
-    /// without.
+    /// other splits are others. Ceilings are made for skins of up to so many taxels: `most_quick` with `--quick`,
+    /// `most` without.
     fn check_released(most_quick: usize, most: usize) {
         let (mut all, mut known) = (BTreeMap::new(), true);
         for task in TASKS {
