@@ -121,6 +121,7 @@ fn a_skin_of_12_by_20_taxels_from_press_to_score() {
 }
 
 #[test]
+#[ignore = "presses and decodes 1024 taxels: half a minute"]
 fn a_skin_of_32_by_32_taxels_from_press_to_score() {
     Skin { rows: 32, cols: 32, measurements: &[51, 205, 410] }.check();
 }

@@ -130,9 +130,16 @@ fn the_published_arm_is_one_of_the_twins() {
     for of in statistics {
         assert!(of["inside"] == true, "{of}");
     }
-    // a table and its JSON, the same for any number of threads
+}
+
+/// A table and its JSON are the same for any number of threads.
+#[test]
+#[ignore = "twice two simulated arms: a quarter of a minute"]
+fn a_comparison_of_arms_does_not_depend_on_the_threads() {
+    let Some(root) = recordings() else { return };
+    let dir = tempfile::tempdir().unwrap();
     let run = |threads: &str| {
-        let two = [&arguments[..], &["--skins", "2", "--threads", threads]].concat();
+        let two = ["compare", root.to_str().unwrap(), "--arm", "--json", "--skins", "2", "--threads", threads];
         let printed = succeeds(dir.path(), &two).stdout;
         (printed, std::fs::read(dir.path().join("out/compare/arm.csv")).unwrap())
     };

@@ -31,13 +31,25 @@ const PARTS: [&str; 5] = ["spread", "session", "hysteresis", "creep", "condition
 
 const CHANGES: [&str; 5] = ["support", "iou", "class_single", "class_vote20", "iou_contact"];
 
-/// Every key, every effect in both directions; the same bytes for one thread and two; and nothing for what does
-/// nothing: rails that are never reached, and noise of no amplitude, change no bit of a recording.
+/// The same bytes for one thread and two.
+#[test]
+#[ignore = "two budgets: half a minute"]
+fn a_budget_does_not_depend_on_the_threads() {
+    let dir = tempfile::tempdir().unwrap();
+    let of = |threads: &str| {
+        budget(dir.path(), "as_built", threads);
+        files(&dir.path().join(threads))
+    };
+    assert!(of("1") == of("2"));
+}
+
+/// Every key, every effect in both directions; and nothing for what does nothing: rails that are never reached, and
+/// noise of no amplitude, change no bit of a recording.
 #[test]
 fn a_quick_budget_is_complete_and_charges_nothing_for_nothing() {
     let dir = tempfile::tempdir().unwrap();
     let readout = with_idle_noise(dir.path(), 0.0);
-    let (report, _) = (budget(dir.path(), readout, "1"), budget(dir.path(), readout, "2"));
+    let report = budget(dir.path(), readout, "2");
     let rows = report["rows"].as_array().unwrap();
     // five parts of the transducer, the effects of the profile and five stages, in both directions, and the contact
     let (_, text) = PROFILES.iter().find(|(name, _)| *name == "as_built").unwrap();
@@ -62,10 +74,8 @@ fn a_quick_budget_is_complete_and_charges_nothing_for_nothing() {
     for point in report["end_points"].as_array().unwrap() {
         assert!((0.0..=1.0).contains(&number(point, "iou")), "{point}");
     }
-    let (one, two) = (files(&dir.path().join("1")), files(&dir.path().join("2")));
-    assert!(one == two, "the budget depends on the number of threads");
     for name in words("budget.csv end_points.csv summary.md figures/budget_matched.png provenance.json") {
-        assert!(one.contains_key(name), "{name}");
+        assert!(dir.path().join("2").join(name).is_file(), "{name}");
     }
 }
 

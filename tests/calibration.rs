@@ -159,6 +159,7 @@ fn the_twin_s_objects_are_the_skin_s() {
 
 /// The numbers of two sessions do not depend on the number of threads.
 #[test]
+#[ignore = "calibrates and replays two sessions twice: a minute"]
 fn threads_do_not_show() {
     let dir = tempfile::tempdir().unwrap();
     let Some(two) = recordings_without(&["center", "eraser", "rec"], dir.path()) else { return };

@@ -1,7 +1,7 @@
 //! Starting the command line.
 
 use std::collections::BTreeMap;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::{Command, Output};
 
 /// The `spts` of this build.
@@ -27,6 +27,16 @@ pub(crate) fn succeeds(dir: &Path, arguments: &[&str]) -> Output {
 /// What `spts` prints as JSON.
 pub(crate) fn json(dir: &Path, arguments: &[&str]) -> serde_json::Value {
     serde_json::from_slice(&succeeds(dir, arguments).stdout).expect("it is JSON")
+}
+
+/// Sessions of a T and a comb on a simulated skin, `presses` each, in `dir/all`. Of more than 15 presses the others are
+/// learned from.
+pub(crate) fn sessions(dir: &Path, presses: usize) -> PathBuf {
+    for object in ["T", "comb"] {
+        let scene = format!("simulate press/{object} --contact footprint --presses {presses} --out all/{object}");
+        succeeds(dir, &words(&scene));
+    }
+    dir.join("all")
 }
 
 /// Runs `spts` and expects status 2 and one line with all of `facts` in it.

@@ -4,7 +4,7 @@
 mod programs;
 mod run;
 
-use crate::recordings::recordings;
+use crate::command::sessions;
 use programs::{hostile, lines};
 use run::{LIMIT_S, Run, SLACK_S};
 use std::path::Path;
@@ -15,12 +15,13 @@ use std::time::{Duration, Instant};
 
 #[test]
 fn hostile_programs_end_within_their_limit_and_leave_nothing() {
-    let Some(recordings) = recordings() else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let sessions = sessions(dir.path(), 1);
     let (table, next) = (hostile(), AtomicUsize::new(0));
     let work = || {
         let mut done = Vec::new();
         while let Some(program) = table.get(next.fetch_add(1, Ordering::Relaxed)) {
-            done.push(tried(&recordings, program));
+            done.push(tried(&sessions, program));
         }
         done
     };
@@ -50,9 +51,9 @@ struct Tried {
     wrong: Option<String>,
 }
 
-fn tried(recordings: &Path, (name, program, expected): &(&str, String, &str)) -> Tried {
+fn tried(sessions: &Path, (name, program, expected): &(&str, String, &str)) -> Tried {
     let run = Run::new();
-    let output = run.output(recordings, program);
+    let output = run.output(sessions, program);
     let took_s = run.since_start_s();
     let said = String::from_utf8_lossy(&output.stderr).into_owned();
     let errors: Vec<&str> = said.lines().filter(|l| l.starts_with("error: ")).collect();
@@ -67,18 +68,19 @@ fn tried(recordings: &Path, (name, program, expected): &(&str, String, &str)) ->
 /// Programs that answer as they should: images, classes alone, and the image of the first class that the header has.
 #[test]
 fn good_programs_are_scored() {
-    let Some(recordings) = recordings() else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let sessions = sessions(dir.path(), 20);
     let learned = "head = json.loads(sys.stdin.readline())\nimages = head[\"learn\"][\"images\"]\n\
                    assert len(images) == len(head[\"learn\"][\"labels\"]) > 9 and len(images[0]) == 100\n\
                    good = json.dumps(dict(image=images[0]))";
     let mut scores = Vec::new();
     for program in [
         lines("", "say(good)", ""),
-        lines("", "say(json.dumps(dict(label=1 if k % 2 else None)))", ""),
+        lines("", "say(json.dumps(dict(label=4 if k % 2 else None)))", ""),
         lines("", "say(good)", "").replacen("sys.stdin.readline()", learned, 1),
     ] {
         let run = Run::new();
-        let mut command = run.command(&recordings, &program, 60.0);
+        let mut command = run.command(&sessions, &program, 60.0);
         let output = command.arg("--json").output().unwrap();
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(output.status.success(), "{program}: {said}");
@@ -93,13 +95,14 @@ fn good_programs_are_scored() {
 /// Three signals, while a program sleeps.
 #[test]
 fn signals_end_programs() {
-    let Some(recordings) = recordings() else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let sessions = sessions(dir.path(), 1);
     for (signal, number) in [("TERM", 15), ("INT", 2), ("HUP", 1)] {
         if signal == "HUP" && ignores_hangups() {
             continue;
         }
         let run = Run::new();
-        let mut command = run.command(&recordings, "trap '' TERM INT HUP; sleep 1000", 600.0);
+        let mut command = run.command(&sessions, "trap '' TERM INT HUP; sleep 1000", 600.0);
         let mut child = command.stderr(Stdio::null()).stdout(Stdio::null()).spawn().unwrap();
         run.wait_for_start();
         sleep(Duration::from_millis(200));
@@ -123,9 +126,10 @@ fn ignores_hangups() -> bool {
 /// A run that is killed ends its programs.
 #[test]
 fn a_killed_run_leaves_no_program() {
-    let Some(recordings) = recordings() else { return };
+    let dir = tempfile::tempdir().unwrap();
+    let sessions = sessions(dir.path(), 1);
     let run = Run::new();
-    let mut command = run.command(&recordings, "trap '' TERM INT HUP; sleep 1000 & sleep 1000", 600.0);
+    let mut command = run.command(&sessions, "trap '' TERM INT HUP; sleep 1000 & sleep 1000", 600.0);
     let mut child = command.stderr(Stdio::null()).stdout(Stdio::null()).spawn().unwrap();
     run.wait_for_start();
     child.kill().unwrap();

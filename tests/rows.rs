@@ -1,6 +1,6 @@
-//! Designed rows: chosen from those that a press was recorded with, on the real skin.
+//! Designed rows: chosen from those that a press was recorded with.
 
-use crate::command::words;
+use crate::command::{json, sessions, words};
 use crate::score::score;
 use serde_json::Value;
 
@@ -52,12 +52,12 @@ fn chosen_rows_see_more_of_the_real_skin() {
 #[test]
 fn chosen_boards_are_reproducible_and_compared() {
     let dir = tempfile::tempdir().unwrap();
-    let arguments =
-        words("--decoder nn_lmmse --sensing chosen,random --measurements 9 --object trig --no-ball --no-times");
-    let on = |threads: &str, more: &[&str]| {
-        score(dir.path(), &[&arguments[..], &["--threads", threads, "--save", "board.json"], more].concat())
-    };
-    let Some(first) = on("1", &[]) else { return };
+    sessions(dir.path(), 3);
+    let arguments = words(
+        "score all --decoder nn_lmmse --sensing chosen,random --measurements 9 --no-times --json --save board.json",
+    );
+    let on = |more: &str| json(dir.path(), &[&arguments[..], &words(more)].concat());
+    let first = on("--threads 1");
     assert_eq!(first["rows"].as_array().unwrap().len(), 2);
     let path = dir.path().join("board.json");
     let mut older: Value = serde_json::from_slice(&std::fs::read(&path).unwrap()).unwrap();
@@ -65,7 +65,7 @@ fn chosen_boards_are_reproducible_and_compared() {
     rows.retain(|r| r["sensing"] == "random");
     rows.iter_mut().for_each(|r| drop(r.as_object_mut().unwrap().remove("sensing")));
     std::fs::write(dir.path().join("older.json"), older.to_string()).unwrap();
-    let second = on("2", &["--against", "older.json", "--tolerance", "0"]).unwrap();
+    let second = on("--threads 2 --against older.json --tolerance 0");
     assert_eq!(first["rows"], second["rows"]);
     assert_eq!(second["regressions"], Value::Array(vec![]));
 }

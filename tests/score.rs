@@ -1,6 +1,6 @@
-//! The board of decoders through its command, on the recordings of the real skin.
+//! The board of decoders through its command.
 
-use crate::command::{refused, spts, succeeds, words};
+use crate::command::{json, refused, sessions, spts, succeeds, words};
 use crate::recordings::recordings;
 use serde_json::Value;
 use std::path::Path;
@@ -27,12 +27,12 @@ fn at_least(board: &Value, decoder: &str, m: u64, left_out: bool, score: &str, l
 /// The same rows for any number of threads, and no score that fell in a board that is held against itself.
 #[test]
 fn boards_are_reproducible_and_compared() {
-    let Some(recordings) = recordings() else { return };
     let dir = tempfile::tempdir().unwrap();
+    sessions(dir.path(), 20);
+    succeeds(dir.path(), &words("simulate bounce --set drop.drops=1 --set drop.duration_s=0.5 --out all/bounce"));
     let run = |more: &[&str]| {
-        let start = ["score", recordings.to_str().unwrap(), "--json", "--no-times"];
-        let decoders = words("--decoder correlate,nn_omp --measurements 20 --object trig --left-out");
-        spts(dir.path(), &[&start[..], &decoders[..], more].concat())
+        let start = words("score all --json --no-times --decoder correlate,nn_omp --measurements 20 --left-out");
+        spts(dir.path(), &[&start[..], more].concat())
     };
     let first = run(&["--threads", "1", "--save", "board.json"]);
     assert!(first.status.success(), "{}", String::from_utf8_lossy(&first.stderr));
@@ -42,6 +42,7 @@ fn boards_are_reproducible_and_compared() {
         (serde_json::from_slice(&first.stdout).unwrap(), serde_json::from_slice(&second.stdout).unwrap());
     assert_eq!(first["rows"], second["rows"]);
     assert_eq!(first["localisation"], second["localisation"]);
+    assert!(!first["localisation"].as_array().unwrap().is_empty());
     assert_eq!(second["regressions"], Value::Array(vec![]));
 }
 
@@ -94,28 +95,26 @@ fn what_a_board_lacks_is_named() {
     assert_eq!(board["differences"][0]["only_before"], serde_json::json!(["correlate"]));
 }
 
-/// A program that calls everything `brain`, fed line by line, is right about brain alone; one that sends nonsense or
+/// A program that calls everything a T, fed line by line, is right about the T alone; one that sends nonsense or
 /// dies ends the run.
 #[test]
 fn external_programs_are_scored_or_named() {
     let dir = tempfile::tempdir().unwrap();
-    let brain = "same=sed -u -e 1d -e 's/.*/{\"label\": 1}/'";
-    let quick = words("--measurements 100 --object brain,rec --no-ball --external");
-    let Some(board) = score(dir.path(), &[&quick[..], &[brain]].concat()) else {
-        return;
-    };
-    let same = row(&board, "same", 100, false);
+    sessions(dir.path(), 20);
+    // the number of the T in the catalogue
+    let letter = "same=sed -u -e 1d -e 's/.*/{\"label\": 4}/'";
+    let quick = words("score all --measurements 10 --external");
+    let board = json(dir.path(), &[&quick[..], &[letter, "--json"]].concat());
+    let same = row(&board, "same", 10, false);
     assert_eq!(same["class_single"], 0.5);
     // it makes no image, so that it has no score of images
     assert!(same["iou"].is_null() && same["iou_ci"].is_null());
-    let recordings = recordings().unwrap();
     for (command, expected) in [
         ("sed -u -e 1d -e 's/.*/{\"image\": [1, 2]}/'", "an image of 2 values; needed are 100"),
         ("sed -u -e 1d -e 's/.*/hello/'", "answered window 1 with `hello`"),
         ("exit 3", "before it had answered"),
     ] {
-        let start = ["score", recordings.to_str().unwrap()];
-        let output = spts(dir.path(), &[&start, &quick[..], &[command]].concat());
+        let output = spts(dir.path(), &[&quick[..], &[command]].concat());
         assert_eq!(output.status.code(), Some(2), "{command}");
         let said = String::from_utf8_lossy(&output.stderr).into_owned();
         assert!(said.contains(expected), "{command}: {said}");

@@ -93,8 +93,10 @@ fn several_wires_from_press_to_score() {
         let decoded = json(here, &["decode", "s", "--measurements", &m, "--out", "d", "--json"]);
         let iou = decoded["rows"][0]["iou"].as_f64().unwrap();
         assert!(iou > least, "{rows} × {rows}, {wires}: {iou}");
-        let scored =
-            json(here, &["score", "s", "--measurements", &m, "--no-times", "--no-ball", "--out", "c", "--json"]);
+        let scored = json(
+            here,
+            &["score", "s", "--decoder", "patches", "--measurements", &m, "--no-times", "--out", "c", "--json"],
+        );
         let best = scored["rows"].as_array().unwrap().iter().filter_map(|row| row["iou"].as_f64()).fold(0.0, f64::max);
         assert!(best > 0.6, "{rows} × {rows}: {best}");
     }
@@ -155,7 +157,8 @@ fn drops_on_several_wires_have_places() {
     let here = dir.path();
     for (side, pitch_m) in [(10, 0.015), (50, 0.003)] {
         let scene = format!(
-            "[[wires]]\nbands = 2\n[skin]\nrows = {side}\ncols = {side}\npitch_m = {pitch_m}\n[drop]\ndrops = 1\n"
+            "[[wires]]\nbands = 2\n[skin]\nrows = {side}\ncols = {side}\npitch_m = {pitch_m}\n[drop]\ndrops = 1\n\
+             duration_s = 0.5\n"
         );
         std::fs::write(here.join("drop.toml"), scene).unwrap();
         succeeds(here, &["simulate", "drop.toml", "--out", "all/drop"]);

@@ -15,10 +15,21 @@ safe_open = pytest.importorskip("safetensors").safe_open
 SHIPPED = Path(__file__).parents[2] / "experiments" / "eval" / "assets" / "amortised.safetensors"
 
 
-def test_the_network_that_ships_is_the_one_that_is_trained():
+@pytest.fixture
+def jax(tmp_path):
+    """JAX that compiles what runs a few times quickly and once."""
+    jax = pytest.importorskip("jax")
+    jax.config.update("jax_disable_most_optimizations", True)
+    jax.config.update("jax_compilation_cache_dir", str(tmp_path / "compiled"))
+    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0)
+    jax.config.update("jax_persistent_cache_min_entry_size_bytes", 0)
+    return jax
+
+
+def test_the_network_that_ships_is_the_one_that_is_trained(jax):
     """On a canvas that is larger than the sheet, as in training."""
     rows, cols, m = 9, 14, 30
-    jnp = pytest.importorskip("jax.numpy")
+    jnp = jax.numpy
     from spts.amortised import network
 
     weights = {name: jnp.asarray(value, jnp.float32) for name, value in safetensors.load_file(SHIPPED).items()}
@@ -44,8 +55,7 @@ def test_the_network_that_ships_is_the_one_that_is_trained():
     assert p[support].min() >= p[~support].max() - 2e-3
 
 
-def test_training_makes_the_same_file_twice(tmp_path, monkeypatch):
-    pytest.importorskip("jax")
+def test_training_makes_the_same_file_twice(jax, tmp_path, monkeypatch):
     pytest.importorskip("optax")
     from spts import amortised
 

@@ -57,15 +57,14 @@ def touching(model, data):
 
 
 @pytest.mark.parametrize(
-    "kind, size, lying",
+    "kind, size, lying, integrator",
     [
-        ("box", ".03 .02 .02", "0 0 0"),
-        ("cylinder", ".03 .02 0", "0 0 0"),
-        ("sphere", ".02 0 0", "0 0 0"),
-        ("capsule", ".02 .03 0", "0 90 0"),
+        ("box", ".03 .02 .02", "0 0 0", "Euler"),
+        ("cylinder", ".03 .02 0", "0 0 0", "implicitfast"),
+        ("sphere", ".02 0 0", "0 0 0", "implicitfast"),
+        ("capsule", ".02 .03 0", "0 90 0", "Euler"),
     ],
 )
-@pytest.mark.parametrize("integrator", ["Euler", "implicitfast"])
 def test_a_body_that_rests_is_carried(kind, size, lying, integrator):
     """Σ p·A = m g within 0.1 %, and MuJoCo's own contact is out."""
     model, data = table(kind, size, lying=lying, integrator=integrator)
@@ -807,9 +806,9 @@ def test_threads_do_not_change_what_is_felt(dog, mode):
         robot.detach()
         return b"".join(part.tobytes() for part in found)
 
-    alone = [felt(seed) for seed in (1, 2, 3)]
-    with concurrent.futures.ThreadPoolExecutor(3) as pool:
-        assert list(pool.map(felt, (1, 2, 3))) == alone
+    alone = [felt(seed) for seed in (1, 2)]
+    with concurrent.futures.ThreadPoolExecutor(2) as pool:
+        assert list(pool.map(felt, (1, 2))) == alone
 
 
 def test_a_deep_contact_is_felt():

@@ -19,7 +19,7 @@ closes its output ## exec >&-; cat > /dev/null ## closed its output before it ha
 closes both ## exec >&- <&-; sleep 1000 ## before it had answered window 1
 grandchild holds the pipe ## sleep 1000 & exit 0 ## `
 a line without an end ## cat /dev/zero ## a line of more than 10496 bytes
-floods standard error ## yes >&2 2>/dev/null | cat > /dev/null ## took longer
+floods standard error ## yes | head -c 10000000 >&2; sleep 1000 ## took longer
 "#;
 
 /// Programs that go on line by line: name, what they do before, for every window, and after, and what the error says.
@@ -39,7 +39,7 @@ label and a half ## ## say(json.dumps(dict(label=1.5))) ## ## `label` = 1.5; val
 label not a number ## ## say(json.dumps(dict(label=float("nan")))) ## ## answered window 1 with
 image not a number ## ## say(json.dumps(dict(image=[float("nan")] * 100))) ## ## answered window 1 with
 image too short ## ## say(json.dumps(dict(image=[1] * 99))) ## ## an image of 99 values; needed are 100
-empty image ## ## say(json.dumps(dict(image=[], label=1))) ## ## an image of 0 values; needed are 100
+empty image ## ## say(json.dumps(dict(image=[], label=0))) ## ## an image of 0 values; needed are 100
 "#;
 
 /// Name, program, and what the error says.

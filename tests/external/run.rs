@@ -38,12 +38,19 @@ impl Run {
         }
     }
 
-    pub(super) fn command(&self, recordings: &Path, program: &str, limit_s: f64) -> Command {
+    pub(super) fn command(&self, sessions: &Path, program: &str, limit_s: f64) -> Command {
         let (name, value) = self.marker.split_once('=').unwrap();
         let mut command = Command::new(SPTS);
         command
-            .args(["score", recordings.to_str().unwrap(), "--measurements", "100"])
-            .args(["--object", "brain", "--no-ball", "--no-times", "--learn-from", "raster"])
+            .args([
+                "score",
+                sessions.to_str().unwrap(),
+                "--measurements",
+                "100",
+                "--no-times",
+                "--learn-from",
+                "raster",
+            ])
             .args(["--external-timeout", &limit_s.to_string(), "--threads", "2"])
             .args(["--external", &format!("x={STARTS}{program}")])
             .env("STARTED", &self.started)
@@ -54,8 +61,8 @@ impl Run {
         command
     }
 
-    pub(super) fn output(&self, recordings: &Path, program: &str) -> Output {
-        self.command(recordings, program, LIMIT_S).output().unwrap()
+    pub(super) fn output(&self, sessions: &Path, program: &str) -> Output {
+        self.command(sessions, program, LIMIT_S).output().unwrap()
     }
 
     /// Waits until the program has begun.
