@@ -96,7 +96,7 @@ browser: setup
 	./scripts/environment.sh "$(BROWSER)" scripts/browser/requirements.txt
 	cargo build $(ALL) --quiet
 	test -n "$$SPTS_REPORT" || target/release/spts reproduce --quick --out "$(BROWSER)/report" >/dev/null
-	SPTS_REPORT="$${SPTS_REPORT:-$(BROWSER)/report}" "$(BROWSER)/bin/python" -m pytest $(PARALLEL) --quiet --tb=short -rs -p no:cacheprovider scripts/browser $(if $(SHOTS),--shots "$(SHOTS)")
+	SPTS_REPORT="$${SPTS_REPORT:-$(BROWSER)/report}" "$(BROWSER)/bin/python" -m pytest $(PARALLEL:loadfile=worksteal) --quiet --tb=short -rs -p no:cacheprovider scripts/browser $(if $(SHOTS),--shots "$(SHOTS)")
 
 # Speed, beside the named peers.
 bench: setup
