@@ -1,8 +1,8 @@
 #!/usr/bin/env bash
 # Tries a release where nothing else is: smoke.sh FOLDER. Lays Debian's smallest system and its Python into an empty
 # root (debootstrap, as root), unpacks the archive and installs the wheel there without a network, and runs both. Where
-# qemu-aarch64-static is installed, the wheel for aarch64 runs in it, on the Python of that Debian. All data sets,
-# and that of target/release/spts where it is built, must have the same digest.
+# qemu-aarch64-static is installed, archive and wheel for aarch64 run in it, on the libraries and the Python of that
+# Debian. All data sets, and that of target/release/spts where it is built, must have the same digest.
 set -euo pipefail
 cd "$(dirname "$0")/.."
 folder=$(realpath "$1")
@@ -45,9 +45,11 @@ if command -v qemu-aarch64-static >/dev/null && ls "$folder"/spts_twin-*aarch64.
   for package in "$arm"/var/cache/apt/archives/*.deb; do dpkg --extract "$package" "$arm"; done
   wheels aarch64 "$work/arm_wheels"
   for wheel in "$work"/arm_wheels/*.whl; do python3 -m zipfile --extract "$wheel" "$work/site"; done
+  tar -xzf "$folder"/spts-*-aarch64-linux.tar.gz --directory "$arm/opt"
+  found+=("$(qemu-aarch64-static -L "$arm" "$arm"/opt/spts-*/bin/spts "${shapes[@]}" "$work/by_aarch64_program" | digest)")
   emulated() { qemu-aarch64-static -L "$arm" -E PYTHONHOME="$arm/usr" -E PYTHONPATH="$work/site" "$arm/usr/bin/python3.11" "$@"; }
   emulated -c 'import platform, spts; print(platform.machine(), spts.Skin(rows=10, cols=10, pitch=0.015))'
-  found+=("$(emulated -m spts "${shapes[@]}" "$work/by_aarch64" | digest)")
+  found+=("$(emulated -m spts "${shapes[@]}" "$work/by_aarch64_wheel" | digest)")
 fi
 if [ -x target/release/spts ]; then
   found+=("$(target/release/spts "${shapes[@]}" "$work/by_clone" | digest)")

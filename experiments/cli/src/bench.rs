@@ -25,7 +25,13 @@ use std::path::{Path, PathBuf};
 /// that change in time, drift, faulty cells, several wires, and a skin of 10,000 taxels. Nothing is downloaded: all
 /// touches are simulated from seeds of the suite. docs/benchmark.md is the protocol.
 #[derive(Debug, Args)]
-#[command(arg_required_else_help = true)]
+#[command(
+    arg_required_else_help = true,
+    after_help = "Examples:
+  spts bench list
+  spts bench run auto --quick
+  spts bench table cards/*.json"
+)]
 pub(super) struct BenchCommand {
     #[command(subcommand)]
     action: Action,
