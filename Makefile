@@ -24,9 +24,10 @@ ALL = --release --locked --workspace --exclude spts-python
 test: setup
 	cargo test $(ALL)
 
-# The slow tests, which `make test` leaves out, some minutes: ngspice's speed, MuJoCo's finite elements, a million edges
-# of a hundred cells, the processor against yasimavr, and with recordings the score curves of twin and skin. Without
-# recordings, ngspice or yasimavr, what needs them says so and is skipped. ONLY="NAME..." runs those tests alone.
+# The slow tests, which `make test` leaves out, twenty minutes: ngspice's speed, MuJoCo's finite elements, a million
+# edges of a hundred cells, the processor against yasimavr, the same results on other numbers of threads, and with
+# recordings the score curves of twin and skin. Without recordings, ngspice or yasimavr, what needs them says so and is
+# skipped. ONLY="NAME..." runs those tests alone.
 ONLY ?=
 validate: setup
 	cargo test $(ALL) --lib --bins --tests -- --ignored $(ONLY)
