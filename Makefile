@@ -90,6 +90,7 @@ book: setup
 
 # The pages that people look at, in a real browser: Debian's Chromium. SHOTS=DIR keeps pictures of them. The report is
 # made before the tests, one of which asks how often the live page is updated; SPTS_REPORT=DIR names one that is there.
+# A core that has no test left takes one of the other's.
 BROWSER ?= out/browser
 SHOTS ?=
 browser: setup

@@ -45,8 +45,12 @@ if command -v qemu-aarch64-static >/dev/null && ls "$folder"/spts_twin-*aarch64.
   for package in "$arm"/var/cache/apt/archives/*.deb; do dpkg --extract "$package" "$arm"; done
   wheels aarch64 "$work/arm_wheels"
   for wheel in "$work"/arm_wheels/*.whl; do python3 -m zipfile --extract "$wheel" "$work/site"; done
-  tar -xzf "$folder"/spts-*-aarch64-linux.tar.gz --directory "$arm/opt"
-  found+=("$(qemu-aarch64-static -L "$arm" "$arm"/opt/spts-*/bin/spts "${shapes[@]}" "$work/by_aarch64_program" | digest)")
+  for archive in "$folder"/spts-*-aarch64-linux.tar.gz; do
+    [ -e "$archive" ] || { echo "skipped: no archive for aarch64"; continue; }
+    mkdir -p "$work/arm_program"
+    tar -xzf "$archive" --directory "$work/arm_program"
+    found+=("$(qemu-aarch64-static -L "$arm" "$work"/arm_program/*/bin/spts "${shapes[@]}" "$work/by_aarch64_program" | digest)")
+  done
   emulated() { qemu-aarch64-static -L "$arm" -E PYTHONHOME="$arm/usr" -E PYTHONPATH="$work/site" "$arm/usr/bin/python3.11" "$@"; }
   emulated -c 'import platform, spts; print(platform.machine(), spts.Skin(rows=10, cols=10, pitch=0.015))'
   found+=("$(emulated -m spts "${shapes[@]}" "$work/by_aarch64_wheel" | digest)")

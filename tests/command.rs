@@ -29,8 +29,8 @@ pub(crate) fn json(dir: &Path, arguments: &[&str]) -> serde_json::Value {
     serde_json::from_slice(&succeeds(dir, arguments).stdout).expect("it is JSON")
 }
 
-/// Sessions of a T and a comb on a simulated skin, `presses` each, in `dir/all`. Of more than 15 presses the others are
-/// learned from.
+/// Sessions of a T and a comb on a simulated skin, `presses` each, in `dir/all`. Of 20 presses ten are scored, and the
+/// others are learned from.
 pub(crate) fn sessions(dir: &Path, presses: usize) -> PathBuf {
     for object in ["T", "comb"] {
         let scene = format!("simulate press/{object} --contact footprint --presses {presses} --out all/{object}");

@@ -43,6 +43,9 @@ fn boards_are_reproducible_and_compared() {
     assert_eq!(first["rows"], second["rows"]);
     assert_eq!(first["localisation"], second["localisation"]);
     assert!(!first["localisation"].as_array().unwrap().is_empty());
+    for decoder in ["correlate", "nn_omp"] {
+        assert!(row(&first, decoder, 20, false)["iou"].is_f64() && row(&first, decoder, 20, true)["iou"].is_f64());
+    }
     assert_eq!(second["regressions"], Value::Array(vec![]));
 }
 
@@ -101,12 +104,16 @@ fn what_a_board_lacks_is_named() {
 fn external_programs_are_scored_or_named() {
     let dir = tempfile::tempdir().unwrap();
     sessions(dir.path(), 20);
-    // the number of the T in the catalogue
-    let letter = "same=sed -u -e 1d -e 's/.*/{\"label\": 4}/'";
+    // the number of the T among the objects
+    let letter = "same=sed -u -e 1d -e 's/.*/{\"label\": 13}/'";
     let quick = words("score all --measurements 10 --external");
     let board = json(dir.path(), &[&quick[..], &[letter, "--json"]].concat());
     let same = row(&board, "same", 10, false);
     assert_eq!(same["class_single"], 0.5);
+    for (name, right) in [("T", 1.0), ("comb", 0.0)] {
+        let found = board["objects"].as_array().unwrap().iter().find(|o| o["object"] == name && o["decoder"] == "same");
+        assert_eq!(found.unwrap()["class_single"], right, "{name}");
+    }
     // it makes no image, so that it has no score of images
     assert!(same["iou"].is_null() && same["iou_ci"].is_null());
     for (command, expected) in [

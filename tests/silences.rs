@@ -9,8 +9,8 @@ fn what_is_asked_for_is_done_or_refused() {
     let dir = tempfile::tempdir().unwrap();
     let dir = dir.path();
     for (seed, out) in [(0, "first"), (2, "second")] {
-        let drop = "simulate bounce --set drop.drops=1 --set drop.duration_s=0.5 --seed";
-        succeeds(dir, &words(&format!("{drop} {seed} --out all/{out}")));
+        let drop = "simulate bounce --set drop.drops=1 --set drop.duration_s=0.5 --set";
+        succeeds(dir, &words(&format!("{drop} seed={seed} --out all/{out}")));
     }
     succeeds(dir, &words("simulate press/T --contact footprint --presses 2 --out all/T"));
     let score = words("score all --decoder tv --measurements 8,20 --no-times --out c --json");

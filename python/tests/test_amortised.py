@@ -15,15 +15,22 @@ safe_open = pytest.importorskip("safetensors").safe_open
 SHIPPED = Path(__file__).parents[2] / "experiments" / "eval" / "assets" / "amortised.safetensors"
 
 
-@pytest.fixture
-def jax(tmp_path):
-    """JAX that compiles what runs a few times quickly and once."""
+@pytest.fixture(scope="module")
+def jax(tmp_path_factory):
+    """JAX that compiles without optimizations, and each function once."""
     jax = pytest.importorskip("jax")
-    jax.config.update("jax_disable_most_optimizations", True)
-    jax.config.update("jax_compilation_cache_dir", str(tmp_path / "compiled"))
-    jax.config.update("jax_persistent_cache_min_compile_time_secs", 0)
-    jax.config.update("jax_persistent_cache_min_entry_size_bytes", 0)
-    return jax
+    changed = {
+        "jax_disable_most_optimizations": True,
+        "jax_compilation_cache_dir": str(tmp_path_factory.mktemp("compiled")),
+        "jax_persistent_cache_min_compile_time_secs": 0,
+        "jax_persistent_cache_min_entry_size_bytes": 0,
+    }
+    before = {name: getattr(jax.config, name) for name in changed}
+    for name, value in changed.items():
+        jax.config.update(name, value)
+    yield jax
+    for name, value in before.items():
+        jax.config.update(name, value)
 
 
 def test_the_network_that_ships_is_the_one_that_is_trained(jax):
@@ -56,6 +63,7 @@ def test_the_network_that_ships_is_the_one_that_is_trained(jax):
 
 
 def test_training_makes_the_same_file_twice(jax, tmp_path, monkeypatch):
+    """The same compiled functions, and everything else anew."""
     pytest.importorskip("optax")
     from spts import amortised
 

@@ -92,6 +92,8 @@ class Visit:
         """Gives the window another width, with everything at its place at once."""
         self.page.add_style_tag(content="* { transition: none !important }")
         self.page.set_viewport_size({"width": width, "height": 900})
+        # what follows the width has done so
+        self.page.evaluate("new Promise(done => requestAnimationFrame(() => requestAnimationFrame(done)))")
         self.width = width
 
     def check(self):

@@ -42,6 +42,8 @@ def test_the_book_is_there():
 def test_every_page_fits(half, visit, address):
     one = visit()
     for page in PAGES[half::2]:
+        # loaded as on a telephone, then made wider
+        one.resize(WIDTHS[0])
         one.open(f"{address}/{page}")
         for width in WIDTHS:
             one.resize(width)

@@ -11,8 +11,8 @@ pub(super) fn lines(before: &str, body: &str, after: &str) -> String {
 
 /// Programs of a shell: name, program, and what the error says.
 const OF_A_SHELL: &str = r#"
-answers without reading ## yes '{"label": 1}' ## windows had been sent
-answers without reading, slowly ## while :; do echo '{"label": 1}'; sleep .2; done ## windows had been sent
+answers without reading ## yes '{"label": 0}' ## windows had been sent
+answers without reading, slowly ## while :; do echo '{"label": 0}'; sleep .2; done ## windows had been sent
 reads nothing ## sleep 1000 ## took longer than the limit of 3 s
 ignores SIGTERM ## trap '' TERM HUP INT; while :; do sleep 1; done ## took longer than the limit
 closes its output ## exec >&-; cat > /dev/null ## closed its output before it had answered window 1

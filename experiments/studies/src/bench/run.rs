@@ -480,7 +480,7 @@ mod tests {
             known &= tests.iter().all(|test| task.released(&test.sha256) == Some(test));
             all.insert(task.name, tests);
         }
-        assert!(known, "they are now\n{}", serde_json::to_string_pretty(&all).unwrap());
+        assert!(known, "of these touches they are now\n{}", serde_json::to_string_pretty(&all).unwrap());
     }
 
     #[test]
@@ -489,7 +489,7 @@ mod tests {
     }
 
     #[test]
-    #[ignore = "the ceilings of all touches: two minutes"]
+    #[ignore = "all touches, floors and ceilings: two minutes"]
     fn all_touches_floors_and_ceilings_are_those_of_the_release() {
         check_released(&[(true, usize::MAX), (false, LARGE)]);
     }
