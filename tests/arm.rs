@@ -2,7 +2,7 @@
 //! recording.
 
 use crate::command::{json, succeeds};
-use crate::recordings::recordings;
+use crate::recordings::recordings_with_arm;
 use serde_json::Value;
 use spts::Twin;
 use spts::record::press_frames;
@@ -10,7 +10,6 @@ use spts::scene::Scene;
 use spts::simulate::{NAMED_SCENES, Request};
 use spts_circuit::Mode;
 use spts_eval::place::find_touches;
-use std::path::PathBuf;
 
 /// Velostat without memory and without spread: its static law alone.
 const STATIC: &str = "[transducer_parameters]\nspread_log_sd = 0.0\nsession_log_sd = 0.0\nsession_tilt_log_sd = 0.0\n\
@@ -115,19 +114,10 @@ fn touches_alone_are_located() {
     assert!(rows.iter().find(at_25).unwrap()["mean_px"].as_f64().unwrap() < 0.1);
 }
 
-/// The recordings, if the robot's arm is among them.
-fn with_arm() -> Option<PathBuf> {
-    let found = recordings().filter(|root| root.join("robot_arm").is_dir());
-    if found.is_none() {
-        eprintln!("skipped: no recordings of the robot's arm");
-    }
-    found
-}
-
 /// Every statistic of the published recording lies where nine in ten simulated skins do.
 #[test]
 fn the_published_arm_is_one_of_the_twins() {
-    let Some(root) = with_arm() else { return };
+    let Some(root) = recordings_with_arm() else { return };
     let dir = tempfile::tempdir().unwrap();
     let arguments = ["compare", root.to_str().unwrap(), "--arm", "--json"];
     let report: Value = json(dir.path(), &arguments);
@@ -142,7 +132,7 @@ fn the_published_arm_is_one_of_the_twins() {
 #[test]
 #[ignore = "twice two simulated arms: a quarter of a minute"]
 fn a_comparison_of_arms_does_not_depend_on_the_threads() {
-    let Some(root) = with_arm() else { return };
+    let Some(root) = recordings_with_arm() else { return };
     let dir = tempfile::tempdir().unwrap();
     let run = |threads: &str| {
         let two = ["compare", root.to_str().unwrap(), "--arm", "--json", "--skins", "2", "--threads", threads];

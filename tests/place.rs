@@ -1,7 +1,7 @@
 //! Where a finger touches the skin around a robot's arm, which is under preload, through the commands.
 
 use crate::command::json;
-use crate::recordings::recordings;
+use crate::recordings::recordings_with_arm;
 use crate::score::score;
 use serde_json::Value;
 
@@ -11,11 +11,7 @@ const MOST_PX: [(u64, f64); 3] = [(7, 2.0), (10, 0.6), (25, 0.05)];
 
 #[test]
 fn touches_of_the_arm_are_located() {
-    let Some(root) = recordings() else { return };
-    if !root.join("robot_arm").is_dir() {
-        eprintln!("skipped: no recordings of the robot's arm");
-        return;
-    }
+    let Some(root) = recordings_with_arm() else { return };
     let dir = tempfile::tempdir().unwrap();
     let arguments = ["--no-times", "--decoder", "correlate", "--measurements", "7,10,25", "--object", "trig"];
     let Some(board) = score(dir.path(), &arguments) else {

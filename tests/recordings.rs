@@ -16,6 +16,15 @@ pub(crate) fn recordings() -> Option<PathBuf> {
     found
 }
 
+/// The recordings, if the robot's arm is among them.
+pub(crate) fn recordings_with_arm() -> Option<PathBuf> {
+    let found = recordings().filter(|root| root.join("robot_arm").is_dir());
+    if found.is_none() {
+        eprintln!("skipped: no recordings of the robot's arm");
+    }
+    found
+}
+
 /// The recordings without the presses of the objects `left_out`, which are linked into `folder`.
 pub(crate) fn recordings_without(left_out: &[&str], folder: &Path) -> Option<PathBuf> {
     let all = recordings()?;
