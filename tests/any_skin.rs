@@ -128,11 +128,11 @@ fn a_skin_of_32_by_32_taxels_from_press_to_score() {
 
 /// Noiseless measurements at as many independent rows as there are taxels give the skin back, whatever the layout, the
 /// levels and the source of the rows. Twice as many rows as taxels have full rank here, and a condition below 100; its
-/// square times the rounding of a sum of 1152 products is 3e-9.
+/// square times the rounding of a sum of 512 products is 1e-9.
 #[test]
 fn a_noiseless_recording_is_recovered_on_any_layout() {
     let own = |taxels: u32| (0..taxels).map(|k| Seeding::Mixed.seed(1_000_003 + 3 * k)).collect::<Vec<u32>>();
-    for (rows, cols, pitch_m) in [(1, 64, 5e-3), (4, 4, 15e-3), (12, 20, 5e-3), (24, 24, 2e-3)] {
+    for (rows, cols, pitch_m) in [(1, 64, 5e-3), (4, 4, 15e-3), (12, 20, 5e-3), (16, 16, 2e-3)] {
         let skin = SkinLayout::with_pitch(rows, cols, pitch_m).unwrap();
         let taxels = u32::try_from(skin.taxels()).unwrap();
         for levels in [CompressiveWeights::Binary, CompressiveWeights::Analog] {
@@ -165,11 +165,12 @@ fn check_recovered(profile: &Profile, skin: &SkinLayout) {
     let volts_per_siemens = profile.on(skin).unwrap().volts_per_siemens();
     let found = nalgebra::DMatrix::from_row_slice(2 * n, n, phi.values());
     let y = nalgebra::DVector::from_column_slice(&recording.blocks()[0].volts);
-    let normal = found.tr_mul(&found).cholesky().expect("rows of full rank");
-    let x = normal.solve(&found.tr_mul(&y));
+    let transposed = found.transpose();
+    let normal = (&transposed * &found).cholesky().expect("rows of full rank");
+    let x = normal.solve(&(transposed * y));
     let largest = 16e-6;
     for (k, (x, g)) in x.iter().zip(&truth).enumerate() {
         let error = (x / volts_per_siemens - g).abs() / largest;
-        assert!(error < 5e-9, "{} × {}, {:?}, taxel {k}: {error}", skin.rows(), skin.cols(), profile.weights);
+        assert!(error < 2e-9, "{} × {}, {:?}, taxel {k}: {error}", skin.rows(), skin.cols(), profile.weights);
     }
 }

@@ -29,7 +29,7 @@ pub(crate) fn json(dir: &Path, arguments: &[&str]) -> serde_json::Value {
     serde_json::from_slice(&succeeds(dir, arguments).stdout).expect("it is JSON")
 }
 
-/// Sessions of a T and a comb on a simulated skin, `presses` each, in `dir/all`. Of 20 presses ten are scored, and the
+/// Sessions of a T and a comb on a simulated skin, `presses` each, in `dir/all`. Of 16 presses ten are scored, and the
 /// others are learned from.
 pub(crate) fn sessions(dir: &Path, presses: usize) -> PathBuf {
     for object in ["T", "comb"] {

@@ -69,7 +69,7 @@ fn tried(sessions: &Path, (name, program, expected): &(&str, String, &str)) -> T
 #[test]
 fn good_programs_are_scored() {
     let dir = tempfile::tempdir().unwrap();
-    let sessions = sessions(dir.path(), 20);
+    let sessions = sessions(dir.path(), 16);
     let learned = "head = json.loads(sys.stdin.readline())\nimages = head[\"learn\"][\"images\"]\n\
                    assert len(images) == len(head[\"learn\"][\"labels\"]) > 9 and len(images[0]) == 100\n\
                    good = json.dumps(dict(image=images[0]))";

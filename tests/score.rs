@@ -28,7 +28,7 @@ fn at_least(board: &Value, decoder: &str, m: u64, left_out: bool, score: &str, l
 #[test]
 fn boards_are_reproducible_and_compared() {
     let dir = tempfile::tempdir().unwrap();
-    sessions(dir.path(), 20);
+    sessions(dir.path(), 16);
     succeeds(dir.path(), &words("simulate bounce --set drop.drops=1 --set drop.duration_s=0.5 --out all/bounce"));
     let run = |more: &[&str]| {
         let start = words("score all --json --no-times --decoder correlate,nn_omp --measurements 20 --left-out");
@@ -103,7 +103,7 @@ fn what_a_board_lacks_is_named() {
 #[test]
 fn external_programs_are_scored_or_named() {
     let dir = tempfile::tempdir().unwrap();
-    sessions(dir.path(), 20);
+    sessions(dir.path(), 16);
     // the number of the T among the objects
     let letter = "same=sed -u -e 1d -e 's/.*/{\"label\": 13}/'";
     let quick = words("score all --measurements 10 --external");

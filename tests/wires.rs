@@ -77,7 +77,7 @@ fn several_wires_from_press_to_score() {
     // the decoders that are shown, and on the large skin one
     let (shown, one): (&[&str], &[&str]) = (&["--no-ball"], &["--decoder", "patches"]);
     for (rows, wires, balls, measurements, least, decoders) in
-        [(32, "round_robin = 4", 1, 120, 0.75, shown), (64, "bands = 4", 2, 400, 0.75, one)]
+        [(24, "round_robin = 4", 1, 80, 0.75, shown), (64, "bands = 4", 2, 400, 0.75, one)]
     {
         let places = [[0.0, 0.0], [0.25, 0.25]];
         let objects: String = places[..balls]

@@ -18,8 +18,8 @@ NOTEBOOKS = sorted((ROOT / "python/notebooks").glob("*.ipynb"))
 MOST = 200_000
 # what is run less often here than in the notebook
 FEWER = {
-    "decoder": {"rows=6000": "rows=2000", "100_000": "10_000"},
-    "own_data": {"measurements=[26, 52, 102]": "measurements=[52]"},
+    "decoder": {"rows=6000": "rows=1000", "100_000": "5_000", "X[:600], images[:600]": "X[:200], images[:200]"},
+    "own_data": {"measurements=[26, 52, 102]": "measurements=[52]", "range(4)": "range(2)"},
     "policy": {"SEEDS, TESTS = 5, 50": "SEEDS, TESTS = 1, 5", "episodes=50": "episodes=10"},
 }
 

@@ -234,17 +234,17 @@ def test_measurements_decoder_rows_and_readout_change_the_images(live):
 
     def changes(canvas, change):
         page.select_option("#readout", "ideal")
-        frames(page, 40)
+        frames(page, 25)
         before = pixels(page, canvas)
         change()
-        frames(page, 40)
+        frames(page, 25)
         assert pixels(page, canvas) != before, canvas
 
     def count(m):
         page.locator("#count").fill(str(m))
         assert page.locator("#count-now").inner_text() == str(m)
 
-    for m in (5, 100, 20):
+    for m in (5, 100):
         changes("image-1", lambda: count(m))
         changes("trace", lambda: count(m + 3 if m < 100 else 60))
     changes("image-0", lambda: page.select_option("#decoder-0", "nn_lmmse"))
@@ -329,10 +329,11 @@ def test_a_mesh_of_a_million_triangles_is_refused_or_pressed_while_the_page_goes
 def test_there_are_twenty_updates_a_second(live):
     one = live()
     page = one.page
-    page.wait_for_timeout(3000)
+    # the page counts over two seconds
+    page.wait_for_timeout(2500)
     # the best of a few looks: other programs of the machine count too
     rates = []
-    for _ in range(10):
+    while max(rates, default=0) < 20 and len(rates) < 10:
         rates.append(page.evaluate("Number(document.body.dataset.rate)"))
         page.wait_for_timeout(500)
     print("updates a second:", rates)

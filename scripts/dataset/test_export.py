@@ -496,7 +496,7 @@ def test_stopped_exports_leave_nothing(layout, program, tmp_path):
     """An export that a signal ends leaves no folder, and the next one is that of a run that nobody stopped."""
     # the last kills, which nothing can tidy up after
     stops = [signal.SIGINT, signal.SIGTERM, signal.SIGKILL]
-    spec = PRESSES.replace("rows = 89\nrows_per_shard = 21", "rows = 3000\nrows_per_shard = 750")
+    spec = PRESSES.replace("rows = 89\nrows_per_shard = 21", "rows = 1200\nrows_per_shard = 300")
     made = program.folder / "long"
     if not made.exists():
         program.make("long", program.spec("long", spec))

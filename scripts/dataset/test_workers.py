@@ -16,13 +16,13 @@ import pytest
 # thirty files, so that there are more than workers and threads
 SPEC = """\
 name = "workers"
-rows = 3000
-rows_per_shard = 100
+rows = 1200
+rows_per_shard = 40
 seed = 5
 
 [object]
 from = "shapes"
-rows_per_shape = 70
+rows_per_shape = 28
 count = { choice = [1, 2] }
 
 [pose]
@@ -30,11 +30,11 @@ x_share = { uniform = [-0.3, 0.3] }
 rotation_deg = { uniform = [-180.0, 180.0] }
 
 [skin]
-rows_per_skin = 30
+rows_per_skin = 12
 presses_before = { choice = [0, 5] }
 """
 # rows of the run that is ended again and again, for each time
-ROWS_PER_KILL = 300
+ROWS_PER_KILL = 120
 RAY_SECONDS = 120
 
 

@@ -2,7 +2,7 @@
 
 A mark is an HTML comment on the line before a block, which no reader sees:
 
-    <!-- run: slow -->          takes minutes: run with `--with slow` alone
+    <!-- run: slow -->          takes half a minute or more: run with `--with slow` alone
     <!-- run: recordings -->    needs recordings of the real skin: run where they are at hand
     <!-- run: network -->       fetches something: run with `--with network` alone
     <!-- run: hardware -->      needs a device, another machine or a second terminal: never run

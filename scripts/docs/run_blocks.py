@@ -4,7 +4,7 @@ Every page has a fresh folder that looks like a checkout with nothing in `out`, 
 `python` blocks run there in their order; a `text` block has to be what the block before it has printed. Lines may be left
 out of it, and `…` stands for anything. `toml` and `rust` blocks are for the tests in Rust. Marks: see blocks.py.
 
-    --with slow             run what takes minutes, too; also `--with network`
+    --with slow             run what takes long, too; also `--with network`
     --without python        leave Python out, where the package `spts` is not built
     --times                 print the time of every block
 """

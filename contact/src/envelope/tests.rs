@@ -285,7 +285,7 @@ fn a_leaning_rim_has_parts_at_every_depth() {
     let mesh = cylinder(0.02, 0.02, 2000);
     let rotation = Rotation3::from_axis_angle(&Vector3::y_axis(), 0.03);
     let low_m = -0.02 * 0.03_f64.sin();
-    for k in 1..12 {
+    for k in (1..12).step_by(2) {
         let height_m = low_m + 1e-3 - 1e-4 * f64::from(k);
         check(&mesh, rotation.matrix().transpose().into(), [1.1e-3, 0.3e-3, height_m], 3).unwrap();
     }

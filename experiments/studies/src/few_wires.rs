@@ -423,7 +423,6 @@ mod tests {
         assert!(one[2].2 > 0.95 && two[1].2 > 0.95, "{one:?} {two:?}");
         assert!(report.rows.iter().all(|r| r.saturated == 0.0 && r.worst_iou <= r.iou && r.classes.is_none()));
         assert_eq!((report.objects, report.scan_iou, report.again_iou), (1, Some(1.0), Some(0.0)));
-        assert_eq!(report, study(vec![1, 2]).run(&()).unwrap());
         // three objects of two touches each: all are known by then, and each by what the others look like
         let one = study(vec![1]);
         let places = ["high", "low", "both"].into_iter().flat_map(|object| {
