@@ -77,7 +77,7 @@ python: wheel
 	"$(PYTHON)/bin/python" -m pytest $(PARALLEL) --quiet --tb=short -rs --disable-warnings -p no:cacheprovider python/tests
 
 # The book, out/book/index.html: its links are checked, its commands and its Python are run. BLOCKS="--with slow" runs
-# what takes minutes, too. MkDocs is not told to be quiet: it would then count no warning. Where the Python package is
+# what takes long, too. MkDocs is not told to be quiet: it would then count no warning. Where the Python package is
 # not built (`make python`), its examples are left out.
 BOOK ?= out/mkdocs
 BLOCKS ?=

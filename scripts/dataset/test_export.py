@@ -501,11 +501,20 @@ def test_stopped_exports_leave_nothing(layout, program, tmp_path):
     if not made.exists():
         program.make("long", program.spec("long", spec))
     line = [sys.executable, EXPORT, made, layout, "--json", "--out"]
-    begin = time.monotonic()
-    whole = json.loads(subprocess.run([*line, tmp_path / "whole"], capture_output=True, check=True).stdout)
+
+    def begun(out, **streams):
+        """An export that has come so far that it writes."""
+        run = subprocess.Popen([*line, out], **streams)
+        while run.poll() is None and not out.with_name(f".{out.name}.spts-export").exists():
+            time.sleep(0.005)
+        return run
+
+    run, begin = begun(tmp_path / "whole", stdout=subprocess.PIPE), time.monotonic()
+    whole = json.loads(run.communicate()[0])
+    assert run.returncode == 0
     seconds, out, stopped = time.monotonic() - begin, tmp_path / "stopped", 0
     for stop, sent in enumerate(stops, 1):
-        run = subprocess.Popen([*line, out], stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
+        run = begun(out, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
         time.sleep(seconds * stop / (len(stops) + 2))
         run.send_signal(sent)
         ended, killed = run.wait(), sent == signal.SIGKILL

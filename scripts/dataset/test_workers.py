@@ -34,7 +34,7 @@ rows_per_skin = 12
 presses_before = { choice = [0, 5] }
 """
 # rows of the run that is ended again and again, for each time
-ROWS_PER_KILL = 120
+ROWS_PER_KILL = 300
 RAY_SECONDS = 120
 
 
