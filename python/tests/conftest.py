@@ -1,9 +1,13 @@
 """What the tests share."""
 
+import signal
+
 import numpy as np
 import pytest
 import spts
 
+# programs that tests end with Ctrl-C inherit what a shell in the background does, which is to ignore it
+signal.signal(signal.SIGINT, signal.default_int_handler)
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 
 
