@@ -234,7 +234,7 @@ def test_measurements_decoder_rows_and_readout_change_the_images(live):
 
     def changes(canvas, change):
         page.select_option("#readout", "ideal")
-        frames(page, 25)
+        frames(page, 40)
         before = pixels(page, canvas)
         change()
         for _ in range(20):

@@ -510,8 +510,9 @@ def test_stopped_exports_leave_nothing(layout, program, tmp_path):
         return run
 
     run, begin = begun(tmp_path / "whole", stdout=subprocess.PIPE), time.monotonic()
-    whole = json.loads(run.communicate()[0])
+    told = run.communicate()[0]
     assert run.returncode == 0
+    whole = json.loads(told)
     seconds, out, stopped = time.monotonic() - begin, tmp_path / "stopped", 0
     for stop, sent in enumerate(stops, 1):
         run = begun(out, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
