@@ -2,7 +2,8 @@
 
 use serde::de::DeserializeOwned;
 use spts_input::{Refusal, Tables};
-use toml::de::Error;
+use toml::Spanned;
+use toml::de::{DeTable, DeValue, Error, ValueDeserializer};
 
 /// A number as a person would write it: without hundreds of zeros.
 struct Shown(f64);
@@ -123,9 +124,12 @@ fn names_a_field(rest: &str) -> bool {
 /// The value that `table` describes.
 ///
 /// # Errors
-/// [`Refusal`], as [`explain_toml`] says it, for an unknown key or a value of the wrong type.
+/// [`Refusal`] for an unknown key or a value of the wrong type, with the field, its value and what is needed.
 pub fn parsed<T: DeserializeOwned>(table: toml::Table) -> Result<T, Refusal> {
-    T::deserialize(Tables(table)).map_err(|error| Refusal::new(explain_toml(&error)))
+    // read as text is, so that every type has one reader, which is most of its code
+    let text = table.to_string();
+    let table = DeTable::parse(&text).map_err(Refusal::from_error)?;
+    deserialized(table).map_err(|error| Refusal::new(explained(&error)))
 }
 
 /// The value that the TOML text `text` describes.
@@ -138,42 +142,41 @@ pub fn parsed<T: DeserializeOwned>(table: toml::Table) -> Result<T, Refusal> {
 /// ```
 ///
 /// # Errors
-/// [`Refusal`] with the line, and the field as [`explain_toml`] says it.
+/// The same, with the line.
 pub fn parsed_text<T: DeserializeOwned>(text: &str) -> Result<T, Refusal> {
-    let read = toml::Deserializer::parse(text).and_then(|reader| T::deserialize(Tables(reader)));
-    read.map_err(|error| {
-        // of a text that is TOML the table knows the field, and the text the line
-        let table = toml::from_str(text).ok();
-        let in_table = table.and_then(|table| parsed::<T>(table).err());
+    let table = DeTable::parse(text).map_err(|error| placed(text, &error, true))?;
+    deserialized(table).map_err(|error| {
         let span = error.span().unwrap_or_default();
         // what is missing has no place
-        let placed = in_table.is_none() || !span.is_empty() && span.end - span.start < text.trim_end().len();
-        let message = in_table.map_or_else(|| explain_toml(&error), |refusal| refusal.to_string());
-        if !placed {
-            return Refusal::new(message);
-        }
-        let start = span.start.min(text.len());
-        let line = text.get(..start).unwrap_or_default().matches('\n').count();
-        let shown = text.lines().nth(line).unwrap_or_default().trim();
-        let shown: String = shown.chars().take(SHOWN).collect();
-        Refusal::new(format!("line {}: {message} (`{shown}`)", line + 1))
+        placed(text, &error, !span.is_empty() && span.len() < text.trim_end().len())
     })
+}
+
+/// The value that a table of a text describes.
+fn deserialized<T: DeserializeOwned>(table: Spanned<DeTable<'_>>) -> Result<T, Error> {
+    let span = table.span();
+    let table = Spanned::new(span, DeValue::Table(table.into_inner()));
+    T::deserialize(Tables(ValueDeserializer::from(table)))
+}
+
+/// `error` in `text`, with its line if it `has_place`.
+fn placed(text: &str, error: &Error, has_place: bool) -> Refusal {
+    let message = explained(error);
+    if !has_place {
+        return Refusal::new(message);
+    }
+    let start = error.span().unwrap_or_default().start.min(text.len());
+    let line = text.get(..start).unwrap_or_default().matches('\n').count();
+    let shown = text.lines().nth(line).unwrap_or_default().trim();
+    let shown: String = shown.chars().take(SHOWN).collect();
+    Refusal::new(format!("line {}: {message} (`{shown}`)", line + 1))
 }
 
 /// Characters of a wrong line that an error repeats: a line of any file of ours is shorter.
 const SHOWN: usize = 120;
 
 /// The message for `error`, an error about a value in a table, such as "`press.force_n` = "much": a number is needed".
-///
-/// ```
-/// use spts_models::explain_toml;
-///
-/// let table: toml::Table = toml::from_str("rows = -1")?;
-/// let error = table.try_into::<spts_models::SkinLayout>().unwrap_err();
-/// assert_eq!(explain_toml(&error), "`rows` = -1: a whole number from 0 on is needed");
-/// # Ok::<(), toml::de::Error>(())
-/// ```
-pub fn explain_toml(error: &Error) -> String {
+fn explained(error: &Error) -> String {
     let shown = error.to_string();
     let key = shown.rsplit_once("in `").and_then(|(_, rest)| rest.trim_end().strip_suffix('`'));
     let message = error.message().trim_end();
@@ -296,8 +299,7 @@ mod tests {
             ("inner.cuont = 1", "unknown field `cuont`, expected `count`"),
         ] {
             let table: toml::Table = toml::from_str(text).unwrap();
-            let error = table.try_into::<Fields>().unwrap_err();
-            let found = explain_toml(&error);
+            let found = parsed::<Fields>(table).unwrap_err().to_string();
             assert!(found.contains(said), "{text}: {found}");
         }
     }

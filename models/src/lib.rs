@@ -31,7 +31,7 @@ mod streams;
 mod transducer;
 mod transducers;
 
-pub use check::{explain_toml, fits_memory, in_interval, in_range, in_section, parsed, parsed_text, within};
+pub use check::{fits_memory, in_interval, in_range, in_section, parsed, parsed_text, within};
 pub use conformance::check_transducer;
 pub use gains::{Mounting, TaxelGains};
 pub use layout::{ConductanceMap, Grid, Pascal, PressureMap, Siemens, SkinLayout};

@@ -6,6 +6,7 @@ use spts_circuit::amplifier::{
 };
 use spts_circuit::{Adc, Profile};
 use spts_input::Refusal;
+use spts_models::parsed;
 
 /// Sizes of a report.
 const SWEEP_TAXELS: [u32; 13] =
@@ -158,10 +159,10 @@ impl ElectronicsStudy {
         let designed = |error: &dyn std::fmt::Display| Refusal::new(format!("profile as_designed: {error}"));
         let profile = Profile::named("as_designed").map_err(|e| designed(&e))?;
         let stage = |stage: &str| {
-            let table = profile.compressive.get(stage).cloned();
+            let table = profile.compressive.get(stage).and_then(|stage| stage.as_table().cloned());
             table.ok_or_else(|| designed(&format_args!("no `compressive.{stage}`")))
         };
-        let parts: Parts = stage("amplifier")?.try_into().map_err(|e| designed(&e))?;
+        let parts: Parts = parsed(stage("amplifier")?).map_err(|e| designed(&e))?;
         Ok(Self {
             op_amp: parts.op_amp,
             network: Network {
@@ -176,7 +177,7 @@ impl ElectronicsStudy {
             rate_hz: profile.sample_rate_hz,
             busy_s: parts.update_s + 1.0 / profile.sample_rate_hz - parts.sample_s,
             sub_array: SUB_ARRAY,
-            adc: stage("adc")?.try_into().map_err(|e| designed(&e))?,
+            adc: parsed(stage("adc")?).map_err(|e| designed(&e))?,
         })
     }
 }

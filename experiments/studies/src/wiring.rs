@@ -5,7 +5,7 @@ use crate::electronics::ElectronicsStudy;
 use spts_circuit::amplifier::{Amplifier, Budget, Network, Setting, Skin};
 use spts_circuit::{PROFILES, Profile, Seeding};
 use spts_input::Refusal;
-use spts_models::parsed_text;
+use spts_models::{parsed, parsed_text};
 use toml::{Table, Value};
 
 /// Share of the converter's range that a fitted feedback uses: the sum is Gaussian, and scenes differ.
@@ -40,7 +40,7 @@ impl Fitted {
         let period_s = available_s + electronics.busy_s;
         let effects = ["late_updates", "contact_noise"];
         let table = profile(amplifier.network().feedback_ohm, 1.0 / period_s, available_s, &effects)?;
-        let profile: Profile = table.try_into().map_err(Refusal::from_error)?;
+        let profile: Profile = parsed(table)?;
         Ok(Self { period_s, profile: Profile { seeding: Some(seeding), ..profile } })
     }
 }

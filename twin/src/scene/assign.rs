@@ -172,7 +172,7 @@ fn forget_object(scene: &mut Table) {
         [("press".to_owned(), Value::Table([object.clone()].into_iter().collect()))].into_iter().collect();
     alone.extend(scene.get("skin").map(|skin| ("skin".to_owned(), skin.clone())));
     // of an object that does not exist nothing is known
-    let Ok(config) = alone.try_into::<SceneConfig>() else {
+    let Ok(config) = SceneConfig::from_table(alone) else {
         return;
     };
     let Ok(mechanics) = Mechanics::new(config.mechanics(), Path::new("")) else {
@@ -199,7 +199,7 @@ mod tests {
             let assignment: Assignment = text.parse().map_err(|e: Refusal| e.to_string())?;
             assignment.apply(&mut table).map_err(|e| e.to_string())?;
         }
-        Ok(table.try_into().unwrap())
+        SceneConfig::from_table(table).map_err(|e| e.to_string())
     }
 
     #[test]

@@ -208,7 +208,7 @@ fn another_object_has_its_own_place() {
     let mut table: toml::Table = toml::from_str(&saved.to_toml().unwrap()).unwrap();
     let assignment: Assignment = "press.object=rec".parse().unwrap();
     assignment.apply(&mut table).unwrap();
-    let changed = Scene::new(table.try_into().unwrap(), Path::new("")).unwrap();
+    let changed = Scene::new(SceneConfig::from_table(table).unwrap(), Path::new("")).unwrap();
     let fresh = Scene::from_toml("[press]\nobject = \"rec\"\nforce_n = 7.0", Path::new("")).unwrap();
     assert_eq!(changed.config(), fresh.config());
 }

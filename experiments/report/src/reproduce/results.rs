@@ -192,9 +192,9 @@ impl ReproductionSize {
         Self {
             raster_presses: 3,
             learning: Learning { presses: 0..2, training_images: 500, sweeps: 5 },
-            compressive_presses: 2,
+            compressive_presses: 1,
             measurements: vec![5, 10, 20, 25, 50],
-            localisation: vec![5, 10, 20, 25, 50],
+            localisation: vec![10, 25, 50],
             timed_decodes: 500,
             protocol: Protocol { first_press: 0, ..few },
             raster_protocol: Protocol { first_press: 2, ..few },
