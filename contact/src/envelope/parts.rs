@@ -41,6 +41,10 @@ pub(super) struct Parts {
     lowest_m: f64,
     bin_m: f64,
     pieces: Vec<Piece>,
+    /// Scratch: where the pieces of each marked cell begin, and once they are in order where they end; and the pieces as
+    /// they came.
+    ends: Vec<usize>,
+    unsorted: Vec<Piece>,
     walls: Vec<[[f64; 3]; 3]>,
     /// In the order of cells, the lowest of each first; depths are below the body's origin.
     pub(super) list: Vec<Part>,
@@ -53,6 +57,12 @@ struct Piece {
     key: u64,
     order: u32,
     sums: [f64; 4],
+}
+
+impl Piece {
+    fn marked(&self) -> usize {
+        usize::try_from(self.key >> 32).unwrap_or(0)
+    }
 }
 
 /// Heights are told apart by bins. The lowest is 2⁻¹² of a cell high; from there on each is as high as all before it,
@@ -72,7 +82,8 @@ impl Parts {
     /// Begins with the marked cells, for a body whose lowest point is at `lowest_m`. Returns the height below which a
     /// triangle may belong to a part below `level_m`.
     pub(super) fn begin(&mut self, raster: &Raster, lowest_m: f64, level_m: f64) -> f64 {
-        self.marked.sort_unstable();
+        // one number is compared faster than two
+        self.marked.sort_unstable_by_key(|[row, col]| (*row as u64) << 32 | *col as u64);
         self.marked.dedup();
         self.pieces.clear();
         self.walls.clear();
@@ -264,15 +275,41 @@ impl Parts {
         at * self.bin_m
     }
 
+    /// Puts the pieces in the order of cells, bins and their own: first those of every cell together, by counting.
+    fn sort(&mut self) {
+        self.ends.clear();
+        self.ends.resize(self.marked.len() + 1, 0);
+        for piece in &self.pieces {
+            self.ends[piece.marked() + 1] += 1;
+        }
+        let mut end = 0;
+        for count in &mut self.ends {
+            end += *count;
+            *count = end;
+        }
+        self.unsorted.clone_from(&self.pieces);
+        for piece in &self.unsorted {
+            // where the cell's next goes, and after the last its end
+            let at = &mut self.ends[piece.marked()];
+            self.pieces[*at] = *piece;
+            *at += 1;
+        }
+        let mut begin = 0;
+        for end in &self.ends[..self.marked.len()] {
+            self.pieces[begin..*end].sort_unstable_by_key(|p| (p.key, p.order));
+            begin = *end;
+        }
+    }
+
     /// Joins the pieces to parts. Where layers of a body lie above each other, the lowest count first.
     pub(super) fn finish(&mut self, raster: &Raster) {
         let walls = std::mem::take(&mut self.walls);
         walls.iter().for_each(|corners| self.add_to(raster, *corners, true));
         self.walls = walls;
-        self.pieces.sort_unstable_by_key(|p| (p.key, p.order));
+        self.sort();
         let mut left = 1.0;
         for pieces in self.pieces.chunk_by_mut(|p, q| p.key == q.key) {
-            let [row, col] = self.marked[usize::try_from(pieces[0].key >> 32).unwrap_or(0)];
+            let [row, col] = self.marked[pieces[0].marked()];
             let cell = row * raster.cols + col;
             if pieces.iter().map(|p| p.sums[0]).sum::<f64>() > 1.0 + LEAST_SHARE {
                 let mean_m = |p: &Piece| p.sums[1] / p.sums[0];
