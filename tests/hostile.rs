@@ -176,6 +176,7 @@ simulate press/T --fault dead:100 | `faults[0].taxel` = 100 | [0, 99] | fault `d
 simulate press/T --set faults.0.taxel=1 | `faults` is a list: `0` is the number of none of its entries (none yet); `faults.+` adds one
 simulate press/T --set press.force_n=much | `press.force_n` = "much": a number is needed
 simulate press/T --set transducer_parameters.temperature_c=x | `transducer_parameters.temperature_c` = "x": a number is needed
+simulate press/T --set press.position_share=[0,0,0] | `press.position_share` = a list of 3: a list of 2 is needed
 simulate press/T --set press.row=3 --set press.position_m=[0.01,0] | press.position_m=[0.01,0]: `press.row=3` says the same in another way
 simulate press/T --row 3 --set press.position_share=[0,0] | press.position_share=[0,0]: `--row 3.0` says the same in another way
 simulate press/T --tolerance 0.1 --set contact.model=layer | contact.model=layer: `--tolerance 0.1` says the same in another way
@@ -368,6 +369,7 @@ P ; scale = 2.0 | `press.scale` is for a mesh, and `press.object` = "T" has its 
 P ; presses = -1 | `press.presses` = -1: a whole number from 0 on is needed
 P ; presses = 4000000000 | presses | [1, 100000]
 P ; position_m = [1.0] | `press.position_m` = a list of 1: a list of 2 is needed
+P ; position_m = [0.0, 0.0, 0.0] | `press.position_m` = a list of 3: a list of 2 is needed
 P ; position_m = [9.0, 0.0] | `press.position_m (x)` = 9 is outside [-0.1425, 0.1425] m
 P ; position_m = [0.0, nan] | `press.position_m (y)` = NaN is outside [-0.1425, 0.1425] m
 P ; position_share = [0.0, 2.0] | `press.position_share (y)` = 2 is outside [-0.95, 0.95]

@@ -1,14 +1,16 @@
-//! Tables stay tables: a list is never taken for the fields of one by their order.
+//! Tables stay tables, and lists are read whole.
 //!
-//! A derived reader takes a list for a table, its first entry for the first field, and so on. Nobody writes that on
-//! purpose, and nobody notices when it is read.
+//! A derived reader takes a list for a table, its first entry for the first field, and so on; and where a list of two is
+//! needed it may take two entries and leave the rest. Nobody writes that on purpose, and nobody notices when it is read.
 
 use serde::de::{
-    DeserializeSeed, Deserializer, EnumAccess, Error, MapAccess, SeqAccess, Unexpected, VariantAccess, Visitor,
+    DeserializeSeed, Deserializer, EnumAccess, Error, IgnoredAny, MapAccess, SeqAccess, Unexpected, VariantAccess,
+    Visitor,
 };
 use std::fmt;
 
-/// A deserializer that refuses a list in the place of a table, on every level.
+/// A deserializer that refuses a list in the place of a table, and one with more entries than are needed, on every
+/// level.
 ///
 /// ```
 /// use serde::Deserialize;
@@ -140,7 +142,17 @@ impl<'de, V: Visitor<'de>> Visitor<'de> for Inside<V> {
         if self.table {
             return Err(A::Error::invalid_type(Unexpected::Seq, &"a table with named fields"));
         }
-        self.visitor.visit_seq(Tables(entries))
+        let mut entries = Entries { of: entries, read: 0 };
+        let value = self.visitor.visit_seq(&mut entries)?;
+        let mut count = entries.read;
+        while entries.of.next_element::<IgnoredAny>()?.is_some() {
+            count += 1;
+        }
+        if count > entries.read {
+            let needed = format!("an array of length {}", entries.read);
+            return Err(A::Error::invalid_length(count, &needed.as_str()));
+        }
+        Ok(value)
     }
 
     fn visit_map<A: MapAccess<'de>>(self, entries: A) -> Result<V::Value, A::Error> {
@@ -160,15 +172,23 @@ impl<'de, S: DeserializeSeed<'de>> DeserializeSeed<'de> for Tables<S> {
     }
 }
 
-impl<'de, A: SeqAccess<'de>> SeqAccess<'de> for Tables<A> {
+/// The entries of a list, and how many of them were read.
+struct Entries<A> {
+    of: A,
+    read: usize,
+}
+
+impl<'de, A: SeqAccess<'de>> SeqAccess<'de> for Entries<A> {
     type Error = A::Error;
 
     fn next_element_seed<S: DeserializeSeed<'de>>(&mut self, seed: S) -> Result<Option<S::Value>, A::Error> {
-        self.0.next_element_seed(Tables(seed))
+        let entry = self.of.next_element_seed(Tables(seed))?;
+        self.read += usize::from(entry.is_some());
+        Ok(entry)
     }
 
     fn size_hint(&self) -> Option<usize> {
-        self.0.size_hint()
+        self.of.size_hint()
     }
 }
 
@@ -270,6 +290,12 @@ mod tests {
             assert!(text != whole);
             let said = read(&text).unwrap_err();
             assert!(said.contains("invalid type: sequence, expected a table"), "{text}: {said}");
+        }
+        for (list, longer) in
+            [("[1, 2]", "[1, 2, 3, [4]]"), (r#"{"One": {"b": {"a": 5}}}"#, r#"{"Two": [6, 7, 8, 9]}"#)]
+        {
+            let said = read(&whole.replace(list, longer)).unwrap_err();
+            assert!(said.contains("invalid length 4, expected an array of length 2"), "{longer}: {said}");
         }
     }
 }

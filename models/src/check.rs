@@ -128,8 +128,8 @@ fn names_a_field(rest: &str) -> bool {
 pub fn parsed<T: DeserializeOwned>(table: toml::Table) -> Result<T, Refusal> {
     // read as text is, so that every type has one reader, which is most of its code
     let text = table.to_string();
-    let table = DeTable::parse(&text).map_err(Refusal::from_error)?;
-    deserialized(table).map_err(|error| Refusal::new(explained(&error)))
+    let table = DeTable::parse(&text).and_then(deserialized);
+    table.map_err(|error| Refusal::new(explained(&error)))
 }
 
 /// The value that the TOML text `text` describes.
@@ -190,6 +190,9 @@ fn explained(error: &Error) -> String {
 
 /// What was found and what is needed, of a message about a value of the wrong type.
 fn mistake(message: &str) -> Option<(String, String)> {
+    if message == "wanted string or table" {
+        return Some(("another value".to_owned(), "a text in quotes".to_owned()));
+    }
     let rest = ["invalid type: ", "invalid value: ", "invalid length "]
         .iter()
         .find_map(|start| message.strip_prefix(start))?;
@@ -200,7 +203,8 @@ fn mistake(message: &str) -> Option<(String, String)> {
 /// What was found, as it is written in TOML.
 fn in_toml(found: &str) -> String {
     match found {
-        "map" => return "a table".to_owned(),
+        // to the reader a date is a table, too
+        "map" => return "a table or a date".to_owned(),
         "sequence" => return "a list".to_owned(),
         _ => {}
     }
@@ -275,6 +279,14 @@ mod tests {
         pair: [f64; 2],
         list: Vec<u8>,
         inner: Inner,
+        kind: Kind,
+    }
+
+    #[derive(Debug, Default, Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    enum Kind {
+        #[default]
+        Plain,
     }
 
     #[derive(Debug, Default, Deserialize)]
@@ -287,7 +299,8 @@ mod tests {
     fn field_value_and_what_is_needed() {
         for (text, said) in [
             ("share = \"much\"", "`share` = \"much\": a number is needed"),
-            ("share = {}", "`share` = a table: a number is needed"),
+            ("share = {}", "`share` = a table or a date: a number is needed"),
+            ("share = 2026-11-30", "`share` = a table or a date: a number is needed"),
             ("name = 3", "`name` = 3: a text in quotes is needed"),
             ("on = 1", "`on` = 1: true or false is needed"),
             ("list = 3", "`list` = 3: a list is needed"),
@@ -296,11 +309,13 @@ mod tests {
             ("inner.count = -1", "`inner.count` = -1: a whole number in [0, 2^32) is needed"),
             ("inner.count = 1.5", "`inner.count` = 1.5: a whole number in [0, 2^32) is needed"),
             ("pair = [1.0]", "`pair` = a list of 1: a list of 2 is needed"),
+            ("pair = [1.0, 2.0, 3.0]", "`pair` = a list of 3: a list of 2 is needed"),
+            ("kind = 3", "`kind` = another value: a text in quotes is needed"),
             ("inner.cuont = 1", "unknown field `cuont`, expected `count`"),
         ] {
             let table: toml::Table = toml::from_str(text).unwrap();
-            let found = parsed::<Fields>(table).unwrap_err().to_string();
-            assert!(found.contains(said), "{text}: {found}");
+            let found = [parsed::<Fields>(table), parsed_text(text)].map(|read| read.unwrap_err().to_string());
+            assert!(found.iter().all(|found| found.contains(said)), "{text}: {found:?}");
         }
     }
 }

@@ -160,7 +160,7 @@ impl ElectronicsStudy {
         let profile = Profile::named("as_designed").map_err(|e| designed(&e))?;
         let stage = |stage: &str| {
             let table = profile.compressive.get(stage).and_then(|stage| stage.as_table().cloned());
-            table.ok_or_else(|| designed(&format_args!("no `compressive.{stage}`")))
+            table.ok_or_else(|| designed(&format_args!("no table `compressive.{stage}`")))
         };
         let parts: Parts = parsed(stage("amplifier")?).map_err(|e| designed(&e))?;
         Ok(Self {
