@@ -21,8 +21,10 @@ install: setup
 # maturin builds the Python package, and sets what a build depends on
 ALL = --release --locked --workspace --exclude spts-python
 
+# KINDS="--doc" runs the tests in the documentation alone
+KINDS ?=
 test: setup
-	cargo test $(ALL)
+	cargo test $(ALL) $(KINDS)
 
 # The slow tests, which `make test` leaves out, twenty minutes: ngspice's speed, MuJoCo's finite elements, a million
 # edges of a hundred cells, the processor against yasimavr, the same results on other numbers of threads, and with

@@ -196,7 +196,7 @@ impl ReproductionSize {
             measurements: vec![5, 10, 20, 25, 50],
             localisation: vec![10, 25, 50],
             timed_decodes: 500,
-            protocol: Protocol { first_press: 0, ..few },
+            protocol: Protocol { first_press: 0, presses: 1, ..few },
             raster_protocol: Protocol { first_press: 2, ..few },
             real_protocol: few,
         }
