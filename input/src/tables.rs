@@ -1,7 +1,8 @@
 //! Tables stay tables, and lists are read whole.
 //!
-//! A derived reader takes a list for a table, its first entry for the first field, and so on; and where a list of two is
-//! needed it may take two entries and leave the rest. Nobody writes that on purpose, and nobody notices when it is read.
+//! A derived reader takes a list for a table, its first entry for the first field, and so on; and where a list of two
+//! is needed it may take two entries and leave the rest. Nobody writes that on purpose, and nobody notices when it is
+//! read.
 
 use serde::de::{
     DeserializeSeed, Deserializer, EnumAccess, Error, IgnoredAny, MapAccess, SeqAccess, Unexpected, VariantAccess,
