@@ -41,8 +41,8 @@ pub(super) struct Parts {
     lowest_m: f64,
     bin_m: f64,
     pieces: Vec<Piece>,
-    /// Scratch: where the pieces of each marked cell begin, and once they are in order where they end; and the pieces as
-    /// they came.
+    /// Scratch: where the pieces of each marked cell begin, and once they are in order where they end; and the pieces
+    /// as they came.
     ends: Vec<usize>,
     unsorted: Vec<Piece>,
     walls: Vec<[[f64; 3]; 3]>,
