@@ -38,7 +38,7 @@ pub(crate) fn to_toml(value: &impl Serialize) -> PyResult<String> {
 
 /// What such a text was made of.
 pub(crate) fn of_toml<T: DeserializeOwned>(text: &str) -> PyResult<T> {
-    toml::from_str(text).map_err(refuse)
+    spts::models::parsed_text(text).map_err(refuse)
 }
 
 /// How deep dictionaries and lists may lie in each other.
